@@ -549,6 +549,13 @@ fn verify_prints_an_object_of_the_schema_for_every_outcome() {
         ),
     );
     write("fault.toml", &torus.replace("radius_mm = 5", "radius_mm = 9"));
+    let curved = "spacing = \"constant\"\nstart = \"auto\"\npattern =";
+    write(
+        "curved.toml",
+        &torus
+            .replace("pattern =", curved)
+            .replace("scallop_mm = 0.005", "scallop_mm = 0.1"),
+    );
     write(
         "line.toml",
         &torus.replace("feed_mm_min = 600", "feed_mm_min = -1"),
@@ -557,6 +564,7 @@ fn verify_prints_an_object_of_the_schema_for_every_outcome() {
         ("verify job.toml --json", 0, "verification"),
         ("verify limits.toml --json", 0, "verification"),
         ("verify fault.toml --json", 1, "verification"),
+        ("verify curved.toml --json", 0, "verification"),
         ("verify line.toml --json", 2, "error"),
         ("verify nothing.toml --json", 2, "error"),
         ("verify --json", 2, "error"),

@@ -135,7 +135,7 @@ impl Arcs {
         };
         let pairs = longest(nodes.len(), fit).map_err(|first| ApproachError::NoSegment {
             path: nodes[first].at.path,
-            side: pass.side,
+            side: pass.side_at(nodes[first].at.path),
         })?;
         Ok(pairs.concat())
     }

@@ -114,7 +114,7 @@ pub fn even_chords(pass: &PassPath<'_>, chord_mm: f64, feed_mm_s: f64) -> Result
 
 /// Curvature of the CC path as a space curve, 1/mm.
 fn path_curvature(pass: &PassPath<'_>, path: f64) -> f64 {
-    let (u, v) = pass.oracle.swapped(path, pass.side);
+    let (u, v) = pass.oracle.swapped(path, pass.side_at(path));
     let at = pass.oracle.surface.at(u, v);
     let (a, aa) = match pass.oracle.along {
         Along::U => (at.u, at.uu),
@@ -147,7 +147,7 @@ fn held_step(pass: &PassPath<'_>, at: &OffsetPoint, chord_mm: f64) -> Result<f64
         if halving == HALVINGS {
             return Err(ApproachError::NoSegment {
                 path: at.path,
-                side: pass.side,
+                side: pass.side_at(at.path),
             });
         }
         bad = Some(good);

@@ -64,7 +64,7 @@ impl Curve {
         };
         longest(nodes.len(), good).map_err(|first| ApproachError::NoSegment {
             path: nodes[first].at.path,
-            side: pass.side,
+            side: pass.side_at(nodes[first].at.path),
         })
     }
 }

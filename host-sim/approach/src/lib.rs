@@ -23,6 +23,7 @@ mod measure;
 mod nodes;
 mod pass;
 mod run;
+mod side_curve;
 
 use glam::DVec3;
 use std::fmt;
@@ -37,7 +38,8 @@ pub use measure::{Measured, measure, measure_run};
 pub use nodes::{Node, Nodes};
 pub use pass::PassPath;
 pub(crate) use pass::from_segment;
-pub use run::{Motion, Planned, passes, planned, run};
+pub use run::{Motion, Planned, curved_passes, passes, planned, run};
+pub use side_curve::{SideCurve, side_curves};
 
 use job::Job;
 use oracle::OracleError;

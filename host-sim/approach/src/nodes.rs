@@ -44,10 +44,7 @@ impl Nodes {
         if pass.is_point() {
             return Ok(Self(Vec::new()));
         }
-        let mut breaks = pass.oracle.surface.breaks(pass.oracle.along);
-        if pass.sense() < 0.0 {
-            breaks.reverse();
-        }
+        let breaks = pass.breaks();
         let steps = PER_SPAN.max(LEAST.div_ceil(breaks.len() - 1));
         let mut nodes: Vec<Node> = Vec::with_capacity(steps * breaks.len());
         let mut lengths = [0.0; 2];

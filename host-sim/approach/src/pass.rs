@@ -1,5 +1,6 @@
 //! A pass in its cutting direction.
 
+use crate::SideCurve;
 use glam::DVec3;
 use oracle::{OffsetPoint, Oracle, OracleError};
 
@@ -10,10 +11,12 @@ pub struct PassPath<'a> {
     pub oracle: &'a Oracle,
     /// Number of the pass, from 0.
     pub pass: u32,
-    /// Its side parameter.
+    /// Its side parameter; at the start of a curve.
     pub side: f64,
     /// Path parameters of start and end.
     pub ends: [f64; 2],
+    /// Its curve, if it is not a line of constant side parameter.
+    pub curve: Option<&'a SideCurve>,
 }
 
 impl PassPath<'_> {
@@ -28,7 +31,34 @@ impl PassPath<'_> {
     /// # Errors
     /// As [`Oracle::offset`].
     pub fn at(&self, path: f64) -> Result<OffsetPoint, OracleError> {
-        self.oracle.offset(path, self.side)
+        match self.curve {
+            Some(curve) => {
+                let [side, slope] = curve.at(path);
+                self.oracle.offset_on_curve(path, side, slope)
+            }
+            None => self.oracle.offset(path, self.side),
+        }
+    }
+
+    /// Side parameter at a path parameter.
+    #[must_use]
+    pub fn side_at(&self, path: f64) -> f64 {
+        self.curve.map_or(self.side, |curve| curve.at(path)[0])
+    }
+
+    /// Path parameters between which it is smooth, in the order of travel.
+    #[must_use]
+    pub fn breaks(&self) -> Vec<f64> {
+        let [start, end] = self.ends;
+        let [low, high] = [start.min(end), start.max(end)];
+        let all = self.oracle.surface.breaks(self.oracle.along);
+        let mut breaks = vec![low];
+        breaks.extend(all.into_iter().filter(|at| *at > low && *at < high));
+        breaks.push(high);
+        if self.sense() < 0.0 {
+            breaks.reverse();
+        }
+        breaks
     }
 
     /// Remaining parameter range up to the end; 0 beyond the end.
@@ -40,7 +70,10 @@ impl PassPath<'_> {
     /// The parameter, clamped to the pass.
     #[must_use]
     pub fn kept(&self, path: f64) -> f64 {
-        let [low, high] = self.oracle.path_range();
+        let [low, high] = match self.curve {
+            Some(_) => [self.ends[0].min(self.ends[1]), self.ends[0].max(self.ends[1])],
+            None => self.oracle.path_range(),
+        };
         path.clamp(low, high)
     }
 
@@ -50,7 +83,7 @@ impl PassPath<'_> {
         const PLACES: u32 = 8;
         let at = |k: u32| {
             let path = self.ends[0] + (self.ends[1] - self.ends[0]) * f64::from(k) / f64::from(PLACES);
-            let (u, v) = self.oracle.swapped(path, self.side);
+            let (u, v) = self.oracle.swapped(path, self.side_at(path));
             self.oracle.surface.at(u, v).point
         };
         let first = at(0);

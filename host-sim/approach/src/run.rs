@@ -1,6 +1,6 @@
 //! Runs an approach over a whole job.
 
-use crate::{Approach, ApproachError, Kind, PassPath};
+use crate::{Approach, ApproachError, Kind, PassPath, SideCurve};
 use glam::DVec3;
 use inspect::plain;
 use job::{Job, Pattern};
@@ -51,6 +51,7 @@ pub fn passes<'a>(oracle: &'a Oracle) -> Result<Vec<PassPath<'a>>, OracleError> 
         } else {
             [low, high]
         },
+        curve: None,
     };
     let schedule = oracle.schedule()?;
     Ok(schedule
@@ -59,6 +60,22 @@ pub fn passes<'a>(oracle: &'a Oracle) -> Result<Vec<PassPath<'a>>, OracleError> 
         .enumerate()
         .map(pass)
         .collect())
+}
+
+/// The passes of a job of constant scallop height, on curves of [`crate::side_curves`].
+#[must_use]
+pub fn curved_passes<'a>(oracle: &'a Oracle, curves: &'a [SideCurve]) -> Vec<PassPath<'a>> {
+    let pass = |(index, curve): (usize, &'a SideCurve)| {
+        let ends = curve.ends();
+        PassPath {
+            oracle,
+            pass: index as u32,
+            side: curve.at(ends[0])[0],
+            ends,
+            curve: Some(curve),
+        }
+    };
+    curves.iter().enumerate().map(pass).collect()
 }
 
 /// Runs a job by an approach, and passes on every sample.

@@ -17,6 +17,7 @@ use verify::reach::{self, ContactPlace, ContactSide, Motion, ReachResult};
 use verify::survey::{SampleObserver, Survey, SurveyResult};
 use verify::swept::{self, Progress, ToolPath};
 
+use crate::curved::{CurvedFigures, curved_figures};
 use crate::run::{PROGRESS_SAMPLES, machine, oracle};
 use crate::{InspectError, TimedRun, plain};
 
@@ -93,6 +94,8 @@ pub struct RunMeasurements {
     pub times: JobTimes,
     /// Passes and the whole job against the optimum; empty if not requested.
     pub optimum: OptimumTimes,
+    /// Passes of constant scallop height beside straight ones; `None` for a job of straight passes.
+    pub curved: Option<CurvedFigures>,
 }
 
 /// A verified job.
@@ -232,6 +235,7 @@ fn measure<'a>(
     } else {
         OptimumTimes::default()
     };
+    let curved = curved_figures(job, prepared).ok().flatten();
     Ok(RunMeasurements {
         findings,
         swept,
@@ -240,6 +244,7 @@ fn measure<'a>(
         axes: axes.into_inner().finish(),
         times,
         optimum,
+        curved,
     })
 }
 

@@ -26,7 +26,7 @@ use std::path::Path;
 
 use job::{
     Along, AlongChoice, CHORD_DEFAULT_MM, CadSource, FEED_MAX_MM_MIN, FEED_MIN_MM_MIN, Job, JobError,
-    MachineProfile, MachineSpec, OVERRUN_MAX_MM, Pattern, Side, Spacing, Start,
+    MachineProfile, MachineSpec, OVERRUN_MAX_MM, Pattern, Side, Spacing, Start, StartChoice,
 };
 use patches::placement::Placement;
 use section::{Reader, Section};
@@ -194,6 +194,10 @@ fn parse_on(
     if along.is_none() {
         origin.set_along_choice(AlongChoice::Auto);
     }
+    let (spacing, is_start_auto) = read_spacing(&cut)?;
+    if is_start_auto {
+        origin.set_start_choice(StartChoice::Auto);
+    }
     let mut job = Job {
         surface,
         region,
@@ -213,7 +217,7 @@ fn parse_on(
             true => cut.choice("pattern", &[("zig", Pattern::Zig), ("zigzag", Pattern::Zigzag)])?,
             false => Pattern::Zig,
         },
-        spacing: read_spacing(&cut)?,
+        spacing,
         chord_mm: match cut.has("chord_mm") {
             true => below_radius("chord_mm", "give the chord error limit in mm, e.g. 0.005")?,
             false => CHORD_DEFAULT_MM.min(0.5 * radius_mm),
@@ -273,35 +277,41 @@ fn own_region(document: &Section<'_>, job: &mut Job, faces: &dyn FaceReader) -> 
     Ok(())
 }
 
-/// The rule for the distance between passes, and where passes of constant scallop height start.
-fn read_spacing(cut: &Section<'_>) -> Result<Spacing, JobError> {
+/// The rule for the distance between passes, and where passes of constant scallop height start; whether that start is chosen by trials.
+fn read_spacing(cut: &Section<'_>) -> Result<(Spacing, bool), JobError> {
+    let starts = [
+        ("edge", Some(Start::Edge)),
+        ("middle", Some(Start::Middle)),
+        ("auto", None),
+    ];
     let start = match cut.has("start") {
-        true => cut.choice("start", &[("edge", Start::Edge), ("middle", Start::Middle)])?,
-        false => Start::Edge,
+        true => cut.choice("start", &starts)?,
+        false => Some(Start::Edge),
     };
     let choices = [
         ("exact", Spacing::Exact),
         ("first-order", Spacing::FirstOrder),
-        ("constant", Spacing::Constant(start)),
+        ("constant", Spacing::Constant(start.unwrap_or(Start::Edge))),
     ];
     let spacing = match cut.has("spacing") {
         true => cut.choice("spacing", &choices)?,
         false => Spacing::Exact,
     };
-    if start != Start::Edge && !spacing.is_constant() {
+    if start != Some(Start::Edge) && !spacing.is_constant() {
+        let word = start.map_or("auto", Start::name);
         return Err(cut.error(
             "start",
-            "`start = \"middle\"` is for passes of constant scallop height only",
+            format!("`start = \"{word}\"` is for passes of constant scallop height only"),
             "remove it, or write spacing = \"constant\"",
         ));
     }
-    Ok(spacing)
+    Ok((spacing, start.is_none()))
 }
 
 /// The overrun of turns, mm.
 fn read_overrun(cut: &Section<'_>) -> Result<f64, JobError> {
     let value = cut.number("overrun_mm")?;
-    if value > 0.0 && read_spacing(cut)?.is_constant() {
+    if value > 0.0 && read_spacing(cut)?.0.is_constant() {
         return Err(cut.error(
             "overrun_mm",
             "passes of constant scallop height have no turns beyond the boundary",

@@ -17,7 +17,9 @@ pub use machine::{
     HeartbeatAction, Homing, MachineProfile, MachineSpec, PERIOD_DEFAULT_US, PERIOD_RANGE_US, Ratio, Spindle,
     SpindleDrive, StepOutput,
 };
-pub use origin::{AlongChoice, CadSource, DirectionTrial, FaceReach, Origin, PartSource};
+pub use origin::{
+    AlongChoice, CadSource, DirectionTrial, FaceReach, Origin, PartSource, SpacingTrial, StartChoice,
+};
 pub use region::Region;
 pub use setup::{Block, Fixture, HolderPart, Setup, TOOL_SIZE_MAX_MM, ToolBody};
 pub use surface::{NurbsSpec, SurfaceSpec};
@@ -95,7 +97,37 @@ pub enum Start {
     Middle,
 }
 
+impl Start {
+    /// The word for it in job files.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Edge => "edge",
+            Self::Middle => "middle",
+        }
+    }
+}
+
 impl Spacing {
+    /// The word for it in job files.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Exact => "exact",
+            Self::FirstOrder => "first-order",
+            Self::Constant(_) => "constant",
+        }
+    }
+
+    /// Where passes of constant scallop height begin.
+    #[must_use]
+    pub const fn start(self) -> Option<Start> {
+        match self {
+            Self::Constant(start) => Some(start),
+            _ => None,
+        }
+    }
+
     /// Whether the passes are curves of constant scallop height.
     #[must_use]
     pub const fn is_constant(self) -> bool {
@@ -126,7 +158,8 @@ pub struct Job {
     pub side: Side,
     /// Order of the passes.
     pub pattern: Pattern,
-    /// Rule for the distance between passes.
+    /// Rule for the distance between passes. The start of passes of constant scallop height is undefined while [`Origin::start_choice`] is
+    /// [`StartChoice::Auto`].
     pub spacing: Spacing,
     /// Chord error limit delta, mm, above 0, below the ball radius; used by the approaches that cut chords.
     pub chord_mm: f64,

@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use crate::{Along, JobError, SurfaceSpec};
+use crate::{Along, JobError, Spacing, SurfaceSpec};
 
 /// Result of a run of the core with the passes in one direction.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -28,6 +28,29 @@ pub enum AlongChoice {
     Auto,
     /// Chosen by trials along u and v, in this order.
     Chosen([DirectionTrial; 2]),
+}
+
+/// Result of a run of the core with one rule for the distance between passes.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SpacingTrial {
+    /// The rule, with the start of passes of constant scallop height.
+    pub spacing: Spacing,
+    /// Periods of the whole job; up to the fault if there is one.
+    pub ticks: u64,
+    /// Reason for which the job cannot be machined so.
+    pub rejection: Option<String>,
+}
+
+/// Origin of the start of passes of constant scallop height.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum StartChoice {
+    /// The job file names it, or the passes are straight.
+    #[default]
+    Given,
+    /// The job file requests a trial of both; before the trial the job cannot be prepared.
+    Auto,
+    /// Chosen by trials from the edge and from the middle, in this order, in the direction of the job.
+    Chosen([SpacingTrial; 2]),
 }
 
 /// The face of a CAD file from which a job's surface was made.
@@ -88,6 +111,7 @@ pub struct Origin {
     text: Arc<str>,
     keys: BTreeMap<String, Range<usize>>,
     along_choice: AlongChoice,
+    start_choice: StartChoice,
     cad: Option<Arc<CadSource>>,
     part: Option<Arc<PartSource>>,
     reach: Option<Arc<FaceReach>>,
@@ -103,6 +127,7 @@ impl Origin {
             text: text.into(),
             keys,
             along_choice: AlongChoice::Given,
+            start_choice: StartChoice::Given,
             cad: None,
             part: None,
             reach: None,
@@ -136,6 +161,23 @@ impl Origin {
     /// Records the origin of the direction.
     pub fn set_along_choice(&mut self, choice: AlongChoice) {
         self.along_choice = choice;
+    }
+
+    /// Origin of the start of passes of constant scallop height.
+    #[must_use]
+    pub fn start_choice(&self) -> &StartChoice {
+        &self.start_choice
+    }
+
+    /// Records the origin of the start.
+    pub fn set_start_choice(&mut self, choice: StartChoice) {
+        self.start_choice = choice;
+    }
+
+    /// Whether a direction or a start is to be chosen by trials.
+    #[must_use]
+    pub fn has_to_choose(&self) -> bool {
+        self.along_choice == AlongChoice::Auto || self.start_choice == StartChoice::Auto
     }
 
     /// The face of a CAD file that the job names as the source of its surface.

@@ -1,14 +1,14 @@
-//! `along = "auto"`: the direction of the passes with the least machining time.
+//! `along = "auto"` and `start = "auto"`: the direction of the passes, and the start of those of constant scallop height, with the least machining time.
 //!
-//! The core runs the whole job in both directions, on two threads, and counts the periods: the machine's exact time, identical
-//! on every computer. The cost is one more run than the job itself, some tenths of a second per million samples.
+//! The core runs the whole job with each of them, on threads, and counts the periods: the machine's exact time, identical
+//! on every computer. The cost of a trial is a run of the job, some tenths of a second per million samples.
 
 use std::fmt;
 
 use crate::Machine;
 use crate::prepare::{Prepared, prepare};
 use explain;
-use job::{Along, AlongChoice, DirectionTrial, Job, JobError};
+use job::{Along, AlongChoice, DirectionTrial, Job, JobError, Spacing, SpacingTrial, Start, StartChoice};
 
 /// A job with a chosen direction, ready for the machine.
 type Ready = (Job, Prepared);
@@ -33,42 +33,103 @@ impl fmt::Display for DirectionError {
 
 impl std::error::Error for DirectionError {}
 
-/// Result of a trial of one direction.
-struct TrialResult {
-    trial: DirectionTrial,
+/// Result of a trial.
+pub(crate) struct TrialResult {
+    along: Along,
+    pub(crate) trial: SpacingTrial,
     ready: Option<Ready>,
     /// The machine accepted the job.
     started: bool,
 }
 
-/// Chooses the direction of a job: as given in its file, or the faster of the two; u if both take the same time.
+impl TrialResult {
+    fn direction(&self) -> DirectionTrial {
+        DirectionTrial {
+            along: self.along,
+            ticks: self.trial.ticks,
+            rejection: self.trial.rejection.clone(),
+        }
+    }
+}
+
+/// The one with less time; the first if both take the same, or neither can be machined.
+pub(crate) fn fastest(first: TrialResult, second: TrialResult) -> TrialResult {
+    let is_refused = |tried: &TrialResult| tried.trial.rejection.is_some();
+    let is_faster = second.trial.ticks < first.trial.ticks || is_refused(&first);
+    if is_faster && !is_refused(&second) {
+        second
+    } else {
+        first
+    }
+}
+
+/// Chooses direction and start of a job: as given in its file, or the faster of the two; u, and the edge, if both take the same time.
 ///
 /// # Errors
-/// The given direction cannot be prepared, or, with `"auto"`, neither direction can be machined.
+/// What is given cannot be prepared, or, with `"auto"`, no choice can be machined.
 pub fn choose(job: Job) -> Result<Ready, DirectionError> {
-    if job.origin.along_choice() != &AlongChoice::Auto {
+    if !job.origin.has_to_choose() {
         let prepared = prepare(&job).map_err(DirectionError::Refused)?;
         return Ok((job, prepared));
     }
-    let (first, second) = std::thread::scope(|scope| {
-        let second = scope.spawn(|| run_trial(&job, Along::V));
-        (run_trial(&job, Along::U), second.join())
+    if job.origin.along_choice() != &AlongChoice::Auto {
+        let (tried, trials) = run_starts(&job, job.along);
+        let started = tried.started;
+        return tried.ready.ok_or_else(|| neither_start(&job, &trials, started));
+    }
+    let (u, v) = std::thread::scope(|scope| {
+        let v = scope.spawn(|| run_direction(&job, Along::V));
+        (run_direction(&job, Along::U), v.join())
     });
-    let second = second.unwrap_or_else(|panic| std::panic::resume_unwind(panic));
-    let trials = [first.trial.clone(), second.trial.clone()];
-    let started = first.started || second.started;
-    // `None` where a direction cannot be machined; the first of equal times is the minimum.
-    let best = [first, second]
-        .into_iter()
-        .filter(|tried| tried.trial.rejection.is_none())
-        .min_by_key(|tried| tried.trial.ticks);
-    match best.and_then(|tried| tried.ready) {
+    let v = v.unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+    let trials = [u.direction(), v.direction()];
+    let started = u.started || v.started;
+    match fastest(u, v).ready {
         Some((mut job, prepared)) => {
             job.origin.set_along_choice(AlongChoice::Chosen(trials));
             Ok((job, prepared))
         }
         None => Err(neither(&job, &trials, started)),
     }
+}
+
+/// Runs the job in one direction, from the faster start if that is to be chosen.
+fn run_direction(job: &Job, along: Along) -> TrialResult {
+    if job.origin.start_choice() == &StartChoice::Auto {
+        run_starts(job, along).0
+    } else {
+        run_trial(job, along, job.spacing, u64::MAX)
+    }
+}
+
+/// Runs the job in one direction from the edge and from the middle: the faster, and both trials.
+fn run_starts(job: &Job, along: Along) -> (TrialResult, [SpacingTrial; 2]) {
+    let [edge, middle] = [Start::Edge, Start::Middle].map(Spacing::Constant);
+    let (edge, middle) = std::thread::scope(|scope| {
+        let middle = scope.spawn(|| run_trial(job, along, middle, u64::MAX));
+        (run_trial(job, along, edge, u64::MAX), middle.join())
+    });
+    let middle = middle.unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+    let trials = [edge.trial.clone(), middle.trial.clone()];
+    let started = edge.started || middle.started;
+    let mut best = fastest(edge, middle);
+    best.started = started;
+    if let Some((job, _)) = &mut best.ready {
+        job.origin.set_start_choice(StartChoice::Chosen(trials.clone()));
+    }
+    (best, trials)
+}
+
+fn neither_start(job: &Job, trials: &[SpacingTrial; 2], started: bool) -> DirectionError {
+    let reason = |trial: &SpacingTrial| trial.rejection.clone().unwrap_or_default();
+    let [edge, middle] = trials;
+    let what = format!(
+        "passes of constant scallop height can start neither on the edge nor in the middle\nfrom the edge: {}\nfrom the middle: {}",
+        reason(edge),
+        reason(middle)
+    );
+    let remedy = "remove the cause given for one of the starts, or write spacing = \"exact\"";
+    refusal(job, "cut.start", what, remedy, started)
 }
 
 fn neither(job: &Job, trials: &[DirectionTrial; 2], started: bool) -> DirectionError {
@@ -80,25 +141,36 @@ fn neither(job: &Job, trials: &[DirectionTrial; 2], started: bool) -> DirectionE
         "neither direction of the passes can be machined\n{}",
         each.collect::<Vec<_>>().join("\n")
     );
-    let remedy = "remove the cause given for one of the directions";
+    refusal(
+        job,
+        "cut.along",
+        what,
+        "remove the cause given for one of the directions",
+        started,
+    )
+}
+
+fn refusal(job: &Job, key: &str, what: String, remedy: &str, started: bool) -> DirectionError {
     if started {
         DirectionError::Faults(format!("{what}\n  help: {remedy}"))
     } else {
-        DirectionError::Refused(job.origin.error("cut.along", what, remedy))
+        DirectionError::Refused(job.origin.error(key, what, remedy))
     }
 }
 
-/// Runs the job in one direction to its end.
-fn run_trial(job: &Job, along: Along) -> TrialResult {
+/// Runs the job in one direction to its end, or for so many periods, with this rule for the distance between passes.
+pub(crate) fn run_trial(job: &Job, along: Along, spacing: Spacing, ticks_max: u64) -> TrialResult {
     let mut job = job.clone();
-    job.along = along;
+    (job.along, job.spacing) = (along, spacing);
     job.origin.set_along_choice(AlongChoice::Given);
-    let trial = |ticks: u64, rejection: Option<String>| DirectionTrial {
-        along,
+    job.origin.set_start_choice(StartChoice::Given);
+    let trial = |ticks: u64, rejection: Option<String>| SpacingTrial {
+        spacing,
         ticks,
         rejection,
     };
     let refused = |why: String| TrialResult {
+        along,
         trial: trial(0, Some(why)),
         ready: None,
         started: false,
@@ -114,13 +186,23 @@ fn run_trial(job: &Job, along: Along) -> TrialResult {
     let mut ticks = 0_u64;
     let ran = machine.run(|_| {
         ticks += 1;
-        true
+        ticks <= ticks_max
     });
-    let rejection = ran.err().map(|fault| {
-        let (pass, path, side) = machine.place();
-        explain::fault_at(fault, ticks, pass, prepared.parameters(path, side))
-    });
+    let rejection = match ran {
+        Err(fault) => {
+            let (pass, path, side) = machine.place();
+            Some(explain::fault_at(
+                fault,
+                ticks,
+                pass,
+                prepared.parameters(path, side),
+            ))
+        }
+        Ok(()) if ticks > ticks_max => Some(format!("it takes more than {ticks_max} periods")),
+        Ok(()) => None,
+    };
     TrialResult {
+        along,
         trial: trial(ticks, rejection),
         ready: Some((job, prepared)),
         started: true,

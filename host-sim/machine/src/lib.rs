@@ -5,6 +5,7 @@
 //!                     └──────remote───────► the same from a board or QEMU
 //! ```
 
+pub mod advice;
 pub mod direction;
 mod in_process;
 pub mod links;

@@ -60,6 +60,42 @@ impl Oracle {
         })
     }
 
+    /// The same at a point of a curve `side(path)` with this slope: the path speed and the centre's derivative are those along the curve.
+    ///
+    /// # Errors
+    /// As [`Oracle::offset`].
+    pub fn offset_on_curve(&self, path: f64, side: f64, slope: f64) -> Result<OffsetPoint, OracleError> {
+        if slope == 0.0 {
+            return self.offset(path, side);
+        }
+        let (u, v) = self.swapped(path, side);
+        let at = self.surface.at(u, v);
+        let mut contact = self.contact_of(&at, u, v)?;
+        let (a, b, aa, bb) = match self.along {
+            Along::U => (at.u, at.v, at.uu, at.vv),
+            Along::V => (at.v, at.u, at.vv, at.uu),
+        };
+        let tangent = a + b * slope;
+        contact.path_speed = tangent.length();
+        let (e, f, g) = (a.length_squared(), a.dot(b), b.length_squared());
+        let determinant = a.cross(b).length_squared();
+        // The second fundamental form of the tangent with A and with B.
+        let mixed = at.uv.dot(contact.normal);
+        let l = aa.dot(contact.normal) + slope * mixed;
+        let m = mixed + slope * bb.dot(contact.normal);
+        let turned = a * (g * l - f * m) + b * (e * m - f * l);
+        let cl_velocity = if determinant > 1e-18 * e * g {
+            tangent - turned * (self.radius_mm / determinant)
+        } else {
+            self.velocity_beside(path, side).unwrap_or_default()
+        };
+        Ok(OffsetPoint {
+            path,
+            contact,
+            cl_velocity,
+        })
+    }
+
     /// `A + r N_A` by the Weingarten equations; `None` where the derivatives do not span the tangent plane.
     fn cl_velocity(&self, at: &Derivatives, normal: DVec3) -> Option<DVec3> {
         let (a, b, aa) = match self.along {

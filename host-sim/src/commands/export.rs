@@ -88,7 +88,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         .spindle
         .map_or(Ok(()), |rpm| positive(rpm, "--spindle"))?;
     let (job, _) = load(&arguments.job)?;
-    super::straight_passes(&job)?;
+    super::whole_surface(&job)?;
     whole::check(&arguments.output, arguments.force)?;
     let options = Options {
         dialect: arguments.format,
@@ -98,10 +98,14 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         spindle_rpm: arguments.spindle,
     };
     let oracle = inspect::oracle(&job)?;
-    let bar = spinner("computing the passes");
-    let count = passes(&oracle).map_err(ExportError::from)?.len();
-    bar.finish_and_clear();
-    let bar = progress(count as u64, "planning");
+    let bar = if job.spacing.is_constant() {
+        spinner("planning the passes that the core makes")
+    } else {
+        let bar = spinner("computing the passes");
+        let count = passes(&oracle).map_err(ExportError::from)?.len();
+        bar.finish_and_clear();
+        progress(count as u64, "planning")
+    };
     let exported = export(&job, &options, &|| bar.inc(1))?;
     bar.finish_and_clear();
     whole::write(&arguments.output, exported.text.as_bytes(), arguments.force)?;

@@ -305,10 +305,13 @@ fn load_on(path: &Path, machine: Option<&PathBuf>) -> Result<(Job, Prepared)> {
     settled(read_job(path, read_profile(machine)?.as_ref())?)
 }
 
-/// Chooses the direction of a job if `along = "auto"`, and prepares it.
+/// Chooses the direction of a job if `along = "auto"`, the start if `start = "auto"`, and prepares it.
 fn settled(job: Job) -> Result<(Job, Prepared)> {
-    let (job, mut prepared) = if job.origin.along_choice() == &AlongChoice::Auto {
-        let bar = spinner("running along u and along v");
+    let (job, mut prepared) = if job.origin.has_to_choose() {
+        let bar = spinner(match job.origin.along_choice() {
+            AlongChoice::Auto => "running along u and along v",
+            _ => "running from the edge and from the middle",
+        });
         let settled = direction::choose(job);
         bar.finish_and_clear();
         settled?
@@ -319,8 +322,8 @@ fn settled(job: Job) -> Result<(Job, Prepared)> {
     Ok((job, prepared))
 }
 
-/// Refuses passes of constant scallop height and those of a region, which only the board makes.
-fn straight_passes(job: &Job) -> Result<()> {
+/// Refuses passes of a region, which only the board makes.
+fn whole_surface(job: &Job) -> Result<()> {
     if job.region.is_some() {
         return Err(job
             .origin
@@ -331,6 +334,12 @@ fn straight_passes(job: &Job) -> Result<()> {
             )
             .into());
     }
+    Ok(())
+}
+
+/// Refuses passes of constant scallop height, too.
+fn straight_passes(job: &Job) -> Result<()> {
+    whole_surface(job)?;
     if job.spacing.is_constant() {
         return Err(job
             .origin

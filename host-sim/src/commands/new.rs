@@ -5,9 +5,11 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::json;
 
+use super::import::advice_json;
 use super::out::say;
-use super::{Result, whole};
+use super::{Result, spinner, whole};
 use crate::template::{self, Kind};
+use machine::advice::advise_spacing;
 
 /// Writes a commented job file that runs at once, with every key, its unit, range and default.
 ///
@@ -32,17 +34,35 @@ pub(super) struct Arguments {
 
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let path = &arguments.output;
-    let text = template::job(arguments.kind, &path.display().to_string());
+    whole::check(path, arguments.force)?;
+    let name = path.display().to_string();
+    let mut text = template::job(arguments.kind, &name);
+    let mut advice = None;
+    if arguments.kind != Kind::File {
+        let bar = spinner("trying straight passes and those of constant scallop height");
+        let found = advise_spacing(&job_file::parse(&name, &text)?);
+        bar.finish_and_clear();
+        if let Some(start) = found.spacing.start() {
+            text = template::with_constant_spacing(&text, start);
+        }
+        advice = Some(found);
+    }
     whole::write(
         path,
         programs::with_command_name(&text).as_bytes(),
         arguments.force,
     )?;
     if arguments.json {
-        say!("{}", json!({ "job": path }));
+        say!(
+            "{}",
+            json!({ "job": path, "spacing": advice.as_ref().map(advice_json) })
+        );
         return Ok(());
     }
     say!("{}", path.display());
+    if let Some(advice) = &advice {
+        say!("  passes: {}", advice.sentence());
+    }
     match arguments.kind {
         Kind::File => say!(
             "  next: set path and face in [surface], then cargo sim simulate {}",

@@ -122,6 +122,9 @@ impl Outcome<'_> {
         };
         say!("  approach     {}", self.kind.name());
         say!("  along        {}", along::sentence(self.job));
+        if let Some(start) = along::start_sentence(self.job) {
+            say!("  start        {start}");
+        }
         say!("  program      {} {parts}, {} bytes", self.segments, self.bytes);
         say!("  passes       {}", findings.passes);
         say!(

@@ -7,7 +7,7 @@ use inspect::{BOUNDS, Requirements, RunMeasurements, TimedRun, Verification, ver
 use job::Job;
 use machine::prepare::Prepared;
 use oracle::{AccuracyFigure, PassSample, SampleCheck};
-use report::{Mark, Remarks, RidgePoint, Scallops, Sketch};
+use report::{Figure, Mark, Remarks, RidgePoint, Scallops, Sketch};
 use serde_json::Value;
 use verify::Verdict;
 use verify::survey::{SampleObserver, SurveyResult};
@@ -119,6 +119,26 @@ fn scallops(job: &Job, swept: &swept::SweptResult) -> Scallops {
     }
 }
 
+/// Figures of curved passes for the page.
+fn figures(measured: &RunMeasurements) -> Vec<Figure> {
+    let Some(curved) = &measured.curved else {
+        return Vec::new();
+    };
+    let mean = (measured.swept.scallop_verdict != Verdict::Unknown).then(|| {
+        (
+            "Mean scallop height",
+            format!("{:.5} mm", measured.swept.scallop_mean_mm),
+        )
+    });
+    let words = along::curved_words(curved).into_iter().chain(mean);
+    words
+        .map(|(what, value)| Figure {
+            what: what.to_owned(),
+            value,
+        })
+        .collect()
+}
+
 /// Places of what is wrong.
 fn marks(job: &Job, timed: &TimedRun, measured: &RunMeasurements) -> Vec<Mark> {
     let mut marks = Vec::new();
@@ -169,6 +189,11 @@ fn json(job: &Job, prepared: &Prepared, found: &Verification) -> Value {
     {
         keys.push(key.into());
     }
+    let curved = found.measured.curved.as_ref();
+    value.insert(
+        "curved".to_owned(),
+        curved.map_or(Value::Null, along::curved_json),
+    );
     value.insert("passes_scanned".to_owned(), found.scanned.into());
     value.insert("failures".to_owned(), found.failures.clone().into());
     value.insert("passed".to_owned(), found.failures.is_empty().into());
@@ -187,7 +212,13 @@ fn print_verification(job: &Job, prepared: &Prepared, found: &Verification, proo
         ..
     } = &found.measured;
     say!("  along        {}", along::sentence(job));
+    if let Some(start) = along::start_sentence(job) {
+        say!("  start        {start}");
+    }
     print(findings, found.scanned);
+    for (what, value) in found.measured.curved.iter().flat_map(along::curved_words) {
+        say!("  {}: {value}", what.to_lowercase());
+    }
     swept_words::print(job, prepared, findings, swept, axes);
     reach_words::print(job, reach);
     if let Some(proof) = proof {
@@ -345,6 +376,7 @@ fn verify_job(arguments: &Arguments, path: &Path, directory: Option<&Path>) -> R
         scallops: Some(scallops(&job, swept)),
         marks: marks(&job, &timed, &found.measured),
         links_mm: found.measured.links_mm.clone(),
+        figures: figures(&found.measured),
         passes: found.measured.optimum.passes.clone(),
         ..remarks(&timed, findings)
     };

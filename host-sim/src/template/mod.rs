@@ -43,6 +43,19 @@ pub fn job(kind: Kind, name: &str) -> String {
     [&head, kind.surface(), include_str!("tail.toml")].concat()
 }
 
+/// A template with passes of constant scallop height.
+#[must_use]
+pub fn with_constant_spacing(text: &str, start: job::Start) -> String {
+    text.replace(
+        "# spacing = \"exact\"          ",
+        "spacing = \"constant\"         ",
+    )
+    .replace(
+        "# start = \"edge\"             ",
+        &format!("{:<31}", format!("start = \"{}\"", start.name())),
+    )
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -766,10 +766,19 @@ impl Run {
         }
     }
 
-    /// Makes a portion of the next front, in the words behind the job's.
-    pub(crate) fn make_front(&mut self, job: &Job<'_>, rest: &mut [i32]) {
-        if let PassPlanning::Fronts(fronts) = &mut self.planning {
-            fronts.work(job, rest);
+    /// Whether the next pass is another part of the front, and found.
+    pub(crate) const fn has_part(&self) -> bool {
+        match &self.planning {
+            PassPlanning::Fronts(fronts) => fronts.has_part(),
+            PassPlanning::Scan(_) => false,
+        }
+    }
+
+    /// Makes a portion of the next front, in the words behind the job's. Returns its cycles.
+    pub(crate) fn make_front(&mut self, job: &Job<'_>, rest: &mut [i32]) -> u32 {
+        match &mut self.planning {
+            PassPlanning::Fronts(fronts) => fronts.work(job, rest),
+            PassPlanning::Scan(_) => 0,
         }
     }
 

@@ -237,10 +237,11 @@ enum Task {
 mod cycles {
     pub(super) use crate::pass::scan::cycles::{ESTIMATE, NEXT, PATCH, STATION};
 
-    /// On a front: a piece, the next one, a station.
+    /// On a front: the first patch of a stretch, a later piece, the search for it, a station.
+    pub(super) const FRONT_PATCH: u32 = 5_600;
     pub(super) const PIECE: u32 = 5_000;
-    pub(super) const EXTEND: u32 = 3_000;
-    pub(super) const FRONT_STATION: u32 = 8_000;
+    pub(super) const EXTEND: u32 = 3_500;
+    pub(super) const FRONT_STATION: u32 = 4_800;
     pub(super) const DERIVATIVES: u32 = 3_400;
     pub(super) const CLOSE: u32 = 1_700;
     pub(super) const HALF: u32 = 1_500;
@@ -349,6 +350,7 @@ impl Lookahead {
         let makes_patch =
             |estimator: &StepOverEstimator| estimator.makes_patch(&self.piece.position, self.fraction());
         match self.task {
+            Task::Patch if self.is_on_front() => cycles::FRONT_PATCH,
             Task::Patch => cycles::PATCH,
             Task::Extend => cycles::EXTEND,
             Task::Station if self.is_on_front() && self.is_beyond_piece() => cycles::PIECE,

@@ -410,13 +410,15 @@ impl Sequencer {
             if cycles == 0 || cycles > left {
                 break;
             }
-            left -= cycles;
             if is_front {
                 makes_front = true;
                 if let Ok((job, rest)) = program.job_and_rest(store) {
-                    run.make_front(&job, rest);
+                    left = left.saturating_sub(run.make_front(&job, rest));
                 }
-            } else if let Ok(job) = program.job(store) {
+                continue;
+            }
+            left -= cycles;
+            if let Ok(job) = program.job(store) {
                 self.work(&job, axes, run);
             }
         }
@@ -441,6 +443,7 @@ impl Sequencer {
         let front = run.front_cycles();
         match cycles {
             Some(cycles) => (false, cycles),
+            None if matches!(self.planning, Planning::Awaited(_)) && run.has_part() => (false, BEGIN_CYCLES),
             None if waits && front > 0 => (true, front),
             None if matches!(self.planning, Planning::Awaited(_)) => (false, BEGIN_CYCLES),
             None => (false, 0),

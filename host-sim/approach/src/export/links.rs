@@ -26,19 +26,27 @@ pub(super) fn approach(blocks: &mut Blocks<'_>, to_mm: DVec3, safe_z_mm: f64, jo
     blocks.cut(&Cut::line(DVec3::new(x, y, near), to_mm, job.feed_mm_s()));
 }
 
-/// Step-over along the boundary at a path parameter, from one side parameter to another, in chords within the tolerance, at the
+/// Greatest distance of the ends of two curved passes between which the tool stays on the boundary, mm.
+const BESIDE_MM: f64 = 6.0;
+
+/// Whether a step-over leads from one end to the next start, path and side parameters: both are on the same boundary, curved ones near each other.
+pub(super) fn is_beside([from, to]: [[f64; 2]; 2], [from_mm, to_mm]: [DVec3; 2], is_curved: bool) -> bool {
+    let is_on_one = from[0] == to[0] || from[1] == to[1];
+    !is_curved || (is_on_one && from_mm.distance(to_mm) <= BESIDE_MM)
+}
+
+/// Step-over along the boundary from one place to another, path and side parameters, in chords within the tolerance, at the
 /// speed that keeps the contact at the feed.
 pub(super) fn step_over(
     oracle: &Oracle,
-    path: f64,
-    [from, to]: [f64; 2],
+    [from, to]: [[f64; 2]; 2],
     job: &Job,
 ) -> Result<Vec<Cut>, ApproachError> {
     let at = |share: f64| {
-        oracle
-            .offset(path, from + (to - from) * share)
-            .map(|at| at.contact)
+        let [path, side] = [0, 1].map(|index| from[index] + (to[index] - from[index]) * share);
+        oracle.offset(path, side).map(|at| at.contact)
     };
+    let [path, side] = from;
     let holds = |count: u32| -> Result<bool, OracleError> {
         let places: Result<Vec<_>, _> = (0..=2 * count)
             .map(|k| at(f64::from(k) / f64::from(2 * count)).map(|contact| contact.cl_mm))
@@ -53,7 +61,7 @@ pub(super) fn step_over(
     let mut count = 1;
     while !holds(count)? {
         if count == CUTS_MAX {
-            return Err(ApproachError::NoSegment { path, side: from });
+            return Err(ApproachError::NoSegment { path, side });
         }
         count *= 2;
     }

@@ -12,7 +12,9 @@
 mod links;
 
 use crate::gcode::{Blocks, Cut, FeedMode};
-use crate::{ApproachError, Arcs, ConstantCl, Kind, Nodes, PassPath, even_chords, passes};
+use crate::{
+    ApproachError, Arcs, ConstantCl, Kind, Nodes, PassPath, curved_passes, even_chords, passes, side_curves,
+};
 use glam::DVec3;
 use job::{Job, Pattern};
 use oracle::Oracle;
@@ -85,8 +87,9 @@ const LEVEL: f64 = 1e-9;
 struct Path {
     begin_mm: DVec3,
     highest_mm: f64,
-    side: f64,
-    end: f64,
+    end_mm: DVec3,
+    /// Path and side parameter of start and end.
+    ends: [[f64; 2]; 2],
     cuts: Vec<Cut>,
 }
 
@@ -103,7 +106,7 @@ impl Path {
         for node in Nodes::new(pass)?.0 {
             highest_mm = highest_mm.max(node.cl_mm()[2]);
             if node.at.contact.normal[2] < -LEVEL {
-                let (u, v) = pass.oracle.swapped(node.at.path, pass.side);
+                let (u, v) = pass.oracle.swapped(node.at.path, pass.side_at(node.at.path));
                 return Err(ExportError::FacesDown { u, v });
             }
         }
@@ -113,8 +116,8 @@ impl Path {
             begin_mm,
             // A degenerate pass has no points.
             highest_mm: highest_mm.max(begin_mm[2]).max(end_mm[2]),
-            side: pass.side,
-            end: pass.ends[1],
+            end_mm,
+            ends: pass.ends.map(|path| [path, pass.side_at(path)]),
             cuts,
         })
     }
@@ -127,7 +130,15 @@ impl Path {
 pub fn export(job: &Job, options: &Options, done: &dyn Fn()) -> Result<ExportedProgram, ExportError> {
     let oracle = Oracle::new(job)?;
     let mut paths = Vec::new();
-    for pass in passes(&oracle)? {
+    let curves = match job.spacing.is_constant() {
+        true => side_curves(job)?,
+        false => Vec::new(),
+    };
+    let passes = match job.spacing.is_constant() {
+        true => curved_passes(&oracle, &curves),
+        false => passes(&oracle)?,
+    };
+    for pass in passes {
         paths.push(Path::new(options.kind, job, &pass)?);
         done();
     }
@@ -138,9 +149,14 @@ pub fn export(job: &Job, options: &Options, done: &dyn Fn()) -> Result<ExportedP
     head(&mut blocks, job, options, paths.len());
     let mut before: Option<&Path> = None;
     for path in &paths {
-        match before.filter(|_| job.pattern == Pattern::Zigzag) {
+        let is_beside = |before: &&Path| {
+            let ends = [before.ends[1], path.ends[0]];
+            let centres = [before.end_mm, path.begin_mm];
+            job.pattern == Pattern::Zigzag && links::is_beside(ends, centres, job.spacing.is_constant())
+        };
+        match before.filter(is_beside) {
             Some(before) => {
-                let over = links::step_over(&oracle, before.end, [before.side, path.side], job)?;
+                let over = links::step_over(&oracle, [before.ends[1], path.ends[0]], job)?;
                 over.iter().for_each(|cut| blocks.cut(cut));
             }
             None => links::approach(&mut blocks, path.begin_mm, safe_z_mm, job, options),

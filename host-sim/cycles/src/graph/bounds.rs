@@ -331,6 +331,31 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "powers of two of a span's parts",
     ),
     (
+        "interp_core::pass::front::advance::Advance::has_crest",
+        16,
+        "places that are passed over: CHUNK",
+    ),
+    (
+        "interp_core::pass::front::advance::Advance::is_near",
+        18,
+        "stations beside one: 2 REACH + 1",
+    ),
+    (
+        "interp_core::pass::front::advance::Advance::pass_over",
+        16,
+        "places that are passed over: CHUNK",
+    ),
+    (
+        "interp_core::pass::front::part::PartSearch::look",
+        1_024,
+        "side spans: SPANS_MAX; bisections of an interval",
+    ),
+    (
+        "interp_core::pass::front::sequence::FrontSequence::plan",
+        8,
+        "portions of a period: PORTIONS_MAX; stations of one: CHUNK",
+    ),
+    (
         "interp_core::pass::front::advance::Advance::sweep",
         8,
         "members that leave the hull: MEMBERS_MAX; columns of a station",
@@ -369,11 +394,6 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "interp_core::pass::front::table::Table::lower",
         4,
         "intervals beside a station",
-    ),
-    (
-        "interp_core::pass::front::sequence::FrontSequence::next_part",
-        513,
-        "stations: PARTS_MAX + 1",
     ),
     (
         "interp_core::pass::front::line::FrontLine::leaves",

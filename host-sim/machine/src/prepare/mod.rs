@@ -16,7 +16,7 @@ mod stream;
 use interp_core::sample::SpanParameter;
 use interp_core::{Header, Pattern, Spacing, StepConfig, SurfaceKind, ToolSide, encode};
 
-use job::{Along, AlongChoice, Job, JobError, SurfaceSpec};
+use job::{Along, AlongChoice, Job, JobError, StartChoice, SurfaceSpec};
 use patches::pieces::Source;
 
 pub use grid::patch_count;
@@ -105,6 +105,13 @@ pub fn prepare(job: &Job) -> Result<Prepared, JobError> {
             "cut.along",
             "the direction of the passes has not been chosen",
             "write along = \"u\" or \"v\", or call `direction::choose`",
+        ));
+    }
+    if job.origin.start_choice() == &StartChoice::Auto {
+        return Err(job.origin.error(
+            "cut.start",
+            "the start of the passes has not been chosen",
+            "write start = \"edge\" or \"middle\", or call `direction::choose`",
         ));
     }
     region::check_job(job)?;

@@ -7,6 +7,7 @@ use crate::job::program::Job;
 use crate::job::stations::Stations;
 use crate::math::arith::{sqrt, to_f32, truncated};
 use crate::math::number::{Bounded, MM_PER_NM, to_f32 as wide_to_f32};
+use crate::pass::front::cost;
 use crate::pass::front::crest::{CURRENT, CrestSearch, NEXT, Place, Tools};
 use crate::pass::front::foot::{FootStep, Found};
 use crate::pass::front::frame::{Frame, FreePatch, MARGIN};
@@ -14,7 +15,6 @@ use crate::pass::front::limits::Limiter;
 use crate::pass::front::side::{Direction, SideCursor, UNIT, WHOLE};
 use crate::pass::front::spline::{self, Cubic};
 use crate::pass::front::table::{Column, Table, UNMEASURED};
-use crate::pass::scan::cycles;
 use crate::sample::SpanParameter;
 
 /// Points on the first line and on the last one by which the pass's length is measured.
@@ -48,8 +48,10 @@ const PLACES: u16 = 3;
 const BENT: f32 = 0.1;
 /// Scallop height to which the crests are measured, as a share of the limit.
 const MEASURED_MARGIN: f32 = 0.990;
-/// Rows of a sweep in one portion.
+/// Rows of a sweep in one portion, and places that are passed over.
 const CHUNK: u16 = 16;
+/// Stations beside those before the boundary up to which a front is stepped: the spline through them forgets what lies farther away.
+const REACH: u16 = 8;
 /// Greatest slope.
 const SLOPE_MAX: f32 = 1e9;
 /// Squares of the derivatives' lengths, side to path, below which an end of the passes is a pole.
@@ -228,21 +230,45 @@ impl Advance {
         })
     }
 
-    /// Cycles of the next portion.
+    /// Most cycles of the next portion.
     pub(crate) const fn cycles(&self) -> u32 {
         match self.task {
             Task::Done => 0,
-            Task::Length | Task::Step | Task::Crest => cycles::PATCH + 2 * cycles::STATION,
-            _ => 6_000,
+            _ => self.expected_cycles().saturating_add(cost::RECORD),
         }
     }
 
-    /// Executes a portion.
-    pub(crate) fn work<W: DerefMut<Target = [i32]>>(&mut self, job: &Job<'_>, table: &mut Table<W>) {
+    /// Cycles of the next portion on the patch of the last one.
+    const fn expected_cycles(&self) -> u32 {
+        match self.task {
+            Task::Done => 0,
+            Task::Length => cost::LENGTH,
+            Task::Step => cost::of(&cost::STEP, self.foot.next),
+            Task::Crest => cost::of(&cost::CREST, self.search.next),
+            Task::Clear | Task::Apply | Task::Level | Task::Shift => cost::COPY,
+            Task::Forwards | Task::Backwards | Task::Compare | Task::Lower | Task::Eliminate => cost::SWEEP,
+            Task::Hull => cost::HULL,
+            Task::Substitute => cost::SUBSTITUTE,
+        }
+    }
+
+    /// Executes a portion. Returns its cycles.
+    pub(crate) fn work<W: DerefMut<Target = [i32]>>(&mut self, job: &Job<'_>, table: &mut Table<W>) -> u32 {
+        let cycles = self.expected_cycles();
+        let record = self.patch.record();
         match self.task {
             Task::Length => self.measure_length(job),
-            Task::Step => self.step(job, table),
-            Task::Crest => self.measure_crest(job, table),
+            Task::Step => {
+                self.pass_over(table);
+                if self.task == Task::Step {
+                    self.step(job, table);
+                }
+            }
+            Task::Crest => {
+                if self.finds_crest(job, table) {
+                    self.measure_crest(job, table);
+                }
+            }
             Task::Done => {}
             _ => {
                 for _ in 0..CHUNK {
@@ -253,6 +279,11 @@ impl Advance {
                     }
                 }
             }
+        }
+        if self.patch.record() == record {
+            cycles
+        } else {
+            cycles.saturating_add(cost::RECORD)
         }
     }
 
@@ -436,6 +467,37 @@ impl Advance {
         for column in [Column::Rise, Column::Fall, Column::Turn] {
             table.set_real(column, station, SLOPE_MAX);
         }
+    }
+
+    /// Passes over places so far beyond the boundary that no pass comes near them: the front there is as far as the limits allow.
+    fn pass_over<W: DerefMut<Target = [i32]>>(&mut self, table: &mut Table<W>) {
+        let count = self.stations.count();
+        let begun = self.station;
+        for _ in 0..CHUNK {
+            let station = self.station >> 1;
+            if self.task != Task::Step || self.foot.next > 0 || self.is_near(table, station) {
+                break;
+            }
+            let cap = self.direction.cap();
+            if self.station & 1 == 1 {
+                table.set_word(Column::Middle, station, cap);
+            } else {
+                table.set_word(Column::Next, station, cap);
+                table.set_word(Column::Mark, station, UNMEASURED);
+            }
+            self.next_station(2 * count - 1);
+        }
+        if self.task == Task::Step && self.station != begun {
+            self.foot.begin(self.step_place(self.station));
+        }
+    }
+
+    /// Whether the front is before the boundary at a station near this one.
+    fn is_near<W: DerefMut<Target = [i32]>>(&self, table: &Table<W>, station: u16) -> bool {
+        let last = self.stations.count().saturating_sub(1);
+        let from = station.saturating_sub(REACH);
+        let to = station.saturating_add(REACH + 1).min(last);
+        (from..=to).any(|at| table.word(Column::Front, at) < self.direction.end)
     }
 
     /// An evaluation of the step at a station, or in the middle of the interval after it.
@@ -675,31 +737,61 @@ impl Advance {
         !(bend.abs() * length * length <= BENT * step)
     }
 
+    /// Whether the crest is to be measured at a place.
+    fn has_crest<W: DerefMut<Target = [i32]>>(&self, job: &Job<'_>, table: &Table<W>, number: u16) -> bool {
+        let places = PLACES * self.stations.count().saturating_sub(1);
+        let station = self.mark_of(number);
+        let bit = if number < places { 1 } else { 2 };
+        let is_middle = number.is_multiple_of(PLACES) || number >= places;
+        if table.word(Column::Mark, station) & bit == 0 {
+            return false;
+        }
+        let [low, high] = [station, station.saturating_add(1)].map(|at| table.word(Column::Front, at));
+        let is_before = |front: i32| front < self.direction.end;
+        (is_before(low) || is_before(high)) && (is_middle || self.is_bent(job, table, station))
+    }
+
+    /// Passes over places at which no crest is to be measured. Whether it came to one where it is.
+    fn finds_crest<W: DerefMut<Target = [i32]>>(&mut self, job: &Job<'_>, table: &mut Table<W>) -> bool {
+        for _ in 0..CHUNK {
+            if self.search.next > 0 || self.has_crest(job, table, self.station) {
+                return true;
+            }
+            self.end_crest(table);
+            if self.task != Task::Crest {
+                break;
+            }
+        }
+        false
+    }
+
     fn measure_crest<W: DerefMut<Target = [i32]>>(&mut self, job: &Job<'_>, table: &mut Table<W>) {
+        let margin = if self.is_level {
+            LEVEL_MARGIN
+        } else {
+            MEASURED_MARGIN
+        };
+        let mut tools = Tools {
+            patch: &mut self.patch,
+            job,
+            cursor: &mut self.cursor,
+            direction: &self.direction,
+        };
+        let Some(excess) = self.search.work(&mut tools, table, margin) else {
+            return;
+        };
+        self.note_excess(table, self.mark_of(self.station), excess);
+        self.end_crest(table);
+    }
+
+    /// Goes on to the next place.
+    fn end_crest<W: DerefMut<Target = [i32]>>(&mut self, table: &mut Table<W>) {
         let places = PLACES * self.stations.count().saturating_sub(1);
         let number = self.station;
         let station = self.mark_of(number);
         let bit = if number < places { 1 } else { 2 };
-        let mark = table.word(Column::Mark, station);
-        let is_middle = number.is_multiple_of(PLACES) || number >= places;
-        if mark & bit != 0 && (is_middle || self.is_bent(job, table, station)) {
-            let margin = if self.is_level {
-                LEVEL_MARGIN
-            } else {
-                MEASURED_MARGIN
-            };
-            let mut tools = Tools {
-                patch: &mut self.patch,
-                job,
-                cursor: &mut self.cursor,
-                direction: &self.direction,
-            };
-            let Some(excess) = self.search.work(&mut tools, table, margin) else {
-                return;
-            };
-            self.note_excess(table, station, excess);
-        }
         if number >= places || (number + 1).is_multiple_of(PLACES) {
+            let mark = table.word(Column::Mark, station);
             table.set_word(Column::Mark, station, mark & !bit);
         }
         self.next_station(places + 2);

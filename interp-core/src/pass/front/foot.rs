@@ -60,7 +60,7 @@ impl Form {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FootStep {
     pub(crate) place: Place,
-    next: u8,
+    pub(crate) next: u8,
     foot: Place,
     /// The front at the place and at the foot.
     at: i32,
@@ -185,6 +185,7 @@ impl FootStep {
                 break;
             }
             let mut slope = own.slope;
+            let mut last = None;
             for _ in 0..ROUNDS {
                 let stretch = form.path + slope * (2.0 * form.mixed + form.side * slope);
                 let determinant = form.path * form.side - form.mixed * form.mixed;
@@ -193,6 +194,10 @@ impl FootStep {
                     break;
                 }
                 let (foot, _) = shifted(table, tools.job, self.place, by);
+                if last == Some(foot) {
+                    break;
+                }
+                last = Some(foot);
                 let along = offset(table, self.place) - offset(table, foot);
                 let point = tools.front(table, CURRENT, foot);
                 slope = point.slope;

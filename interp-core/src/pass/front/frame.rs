@@ -28,6 +28,11 @@ impl FreePatch {
         record: None,
     };
 
+    /// The spans of its record, if it has one.
+    pub(crate) const fn record(&self) -> Option<[u16; 2]> {
+        self.record
+    }
+
     /// Forgets the record: the job may be another.
     pub(crate) const fn forget(&mut self) {
         self.record = None;

@@ -21,15 +21,19 @@
 //! | [`limits`] | slope and turning of a front |
 //! | [`crest`] | the height between two fronts, measured by the balls |
 //! | [`advance`] | the next front, in portions |
+//! | [`cost`] | cycles of the portions |
 //! | [`line`] | a pass on a front, and its pieces |
+//! | [`part`] | the parts of a front before the boundary |
 //! | [`sequence`] | the passes in order |
 
 mod advance;
+mod cost;
 mod crest;
 mod foot;
 mod frame;
 mod limits;
 mod line;
+mod part;
 mod sequence;
 mod side;
 mod spline;

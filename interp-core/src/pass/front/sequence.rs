@@ -5,10 +5,10 @@ use crate::job::program::Job;
 use crate::job::{Pattern, Spacing};
 use crate::math::number::Bounded;
 use crate::pass::front::advance::{Advance, Made};
-use crate::pass::front::line::FrontLine;
-use crate::pass::front::side::{Direction, SideCursor, fine};
-use crate::pass::front::spline::Cubic;
-use crate::pass::front::table::{Column, Table};
+use crate::pass::front::cost;
+use crate::pass::front::part::PartSearch;
+use crate::pass::front::side::{Direction, SideCursor};
+use crate::pass::front::table::Table;
 use crate::pass::route::Route;
 use crate::sample::SpanParameter;
 
@@ -50,8 +50,8 @@ pub(crate) struct FrontSequence {
     fronts: u32,
     direction: Direction,
     cursor: SideCursor,
-    /// The station after the end of the latest pass, in the order of travel.
-    after: u16,
+    /// The search for the next part of the latest pass's front, or for the first one of the next front.
+    part_search: PartSearch,
     /// The latest pass is the last one on its front.
     is_last_part: bool,
     /// The latest pass is on a front, or a line, that the tool has not come to: the front before it is still needed.
@@ -69,7 +69,7 @@ impl FrontSequence {
         fronts: 0,
         direction: Direction::FROM_EDGE,
         cursor: SideCursor::NONE,
-        after: 0,
+        part_search: PartSearch::IDLE,
         is_last_part: true,
         is_ahead: false,
         begins_part: false,
@@ -79,6 +79,7 @@ impl FrontSequence {
     /// Ends the work.
     pub(crate) const fn stop(&mut self) {
         self.advance.stop();
+        self.part_search.stop();
     }
 
     /// Begins, with the first pass.
@@ -92,6 +93,7 @@ impl FrontSequence {
         } else {
             Direction::FROM_EDGE
         };
+        self.part_search.stop();
         self.advance.begin(self.cursor, self.direction, true);
         self.line = Line::First;
         let (side, _) = self.cursor.seek(job, &self.direction, 0);
@@ -100,18 +102,46 @@ impl FrontSequence {
 
     /// Whether [`Self::plan`] has anything to do.
     pub(crate) fn has_work(&self) -> bool {
-        self.advance.has_work()
+        self.part_search.has_work() || self.advance.has_work()
     }
 
-    /// Cycles of the next portion; 0 where there is none.
+    /// Most cycles of the next portion; 0 where there is none.
     pub(crate) const fn cycles(&self) -> u32 {
-        self.advance.cycles()
+        if self.part_search.has_work() {
+            cost::PART
+        } else {
+            self.advance.cycles()
+        }
     }
 
-    /// A portion of the next front, into the words behind the job's.
-    pub(crate) fn work(&mut self, job: &Job<'_>, words: &mut [i32]) {
-        let mut table = Table::new(&mut *words, self.advance.stations(), self.swapped);
-        self.advance.work(job, &mut table);
+    /// A portion of the next front, into the words behind the job's. Returns its cycles.
+    pub(crate) fn work(&mut self, job: &Job<'_>, words: &mut [i32]) -> u32 {
+        let stations = self.advance.stations();
+        if self.part_search.has_work() {
+            let table = Table::new(&*words, stations, self.part_search.swapped);
+            self.part_search.work(job, &table);
+            return cost::PART;
+        }
+        let mut table = Table::new(&mut *words, stations, self.swapped);
+        let cycles = self.advance.work(job, &mut table);
+        self.seek_first_part(job);
+        cycles
+    }
+
+    /// Begins the search for the first part of the front that is made, once no part of the one before is left.
+    fn seek_first_part(&mut self, job: &Job<'_>) {
+        let is_made = matches!(self.advance.made(), Some(Ok(Made::Front)));
+        if is_made && !self.is_ahead && self.needs_front() && self.part_search.is_idle() {
+            let part = if self.begins_part { 1 } else { self.part };
+            let reversed = is_reversed(job.header.pattern, self.fronts.wrapping_add(1), part);
+            self.part_search
+                .begin(self.advance.direction, self.cursor, reversed, !self.swapped);
+        }
+    }
+
+    /// Whether the pass after the latest one is another part of its front, and found.
+    pub(crate) const fn has_part(&self) -> bool {
+        matches!(self.line, Line::Front) && !self.is_last_part && self.part_search.is_found()
     }
 
     /// The planning of one period of a job without limits.
@@ -120,26 +150,21 @@ impl FrontSequence {
         let share = (job.header.period_s / PORTION_PERIOD_S).at_most(1.0);
         let mut left = share * PORTION_CYCLES;
         for portion in 0..PORTIONS_MAX {
-            let cycles = f32::from(u16::try_from(self.cycles()).unwrap_or(u16::MAX));
-            if cycles == 0.0 || (cycles > left && portion > 0) {
+            let real = |cycles: u32| f32::from(u16::try_from(cycles).unwrap_or(u16::MAX));
+            let most = real(self.cycles());
+            if most == 0.0 || (most > left && portion > 0) {
                 return;
             }
-            left -= cycles;
-            self.work(job, words);
-        }
-    }
-
-    /// Whether the front of this number is travelled backwards.
-    const fn is_reversed(&self, pattern: Pattern) -> bool {
-        match pattern {
-            Pattern::Zigzag => self.fronts % 2 == 1,
-            // The other direction keeps the side on which the material is.
-            Pattern::Zig => self.part == 1,
+            left -= real(self.work(job, words));
         }
     }
 
     fn whole_line(&self, job: &Job<'_>, side: SpanParameter) -> Route {
-        Route::whole(side, self.is_reversed(job.header.pattern), job.header.path_spans)
+        Route::whole(
+            side,
+            is_reversed(job.header.pattern, self.fronts, self.part),
+            job.header.path_spans,
+        )
     }
 
     /// The tool leaves the pass before the latest one: the front after the latest can be made in the place of the one before.
@@ -183,11 +208,8 @@ impl FrontSequence {
     /// # Errors
     /// [`FaultKind::IntervalTooSmall`] where the front does not move.
     pub(crate) fn next(&mut self, job: &Job<'_>) -> Result<NextRoute> {
-        if self.line == Line::Front {
-            let swapped = self.swapped != self.is_ahead;
-            if let Some(route) = self.next_part(job, swapped) {
-                return Ok(NextRoute::Pass(route));
-            }
+        if self.line == Line::Front && !self.is_last_part {
+            return self.take_part(job);
         }
         if self.is_over() {
             return Ok(NextRoute::None);
@@ -199,6 +221,10 @@ impl FrontSequence {
             return Ok(NextRoute::NotYet);
         };
         let made = made?;
+        if made == Made::Front && !self.part_search.is_found() {
+            self.seek_first_part(job);
+            return Ok(NextRoute::NotYet);
+        }
         if self.begins_part {
             self.part = 1;
         }
@@ -209,10 +235,7 @@ impl FrontSequence {
         match made {
             Made::Front => {
                 self.line = Line::Front;
-                self.after = 0;
-                let route = self.next_part(job, !self.swapped);
-                let route = route.ok_or(Fault::new(FaultKind::IntervalTooSmall, 0.0))?;
-                Ok(NextRoute::Pass(route))
+                self.take_part(job)
             }
             Made::Beyond => {
                 self.line = Line::Last;
@@ -223,73 +246,27 @@ impl FrontSequence {
         }
     }
 
-    /// The next part of the front that is before the boundary, from the station `after` in the order of travel.
-    fn next_part(&mut self, job: &Job<'_>, swapped: bool) -> Option<Route> {
-        let stations = self.advance.stations();
-        let reversed = self.is_reversed(job.header.pattern);
-        let table = Table::new(job.rest(), stations, swapped);
-        let count = stations.count();
-        let boundary = self.direction.end;
-        let own = |index: u16| {
-            if reversed {
-                count.saturating_sub(index + 1)
-            } else {
-                index
-            }
-        };
-        let is_before = |index: u16| table.word(Column::Front, own(index)) < boundary;
-        let crossing = |index: u16| {
-            let interval = own(index).min(own(index + 1));
-            let length = stations.length(job, interval);
-            let cubic = Cubic::of(&table, [Column::Front, Column::Slope], interval, length);
-            stations.place_within(interval, cubic.crossing(boundary))
-        };
-        let mut index = self.after;
-        while index < count && !is_before(index) {
-            index += 1;
+    /// The part of a front that was found.
+    ///
+    /// # Errors
+    /// [`FaultKind::IntervalTooSmall`] where the front has none.
+    fn take_part(&mut self, job: &Job<'_>) -> Result<NextRoute> {
+        if !self.part_search.is_found() {
+            return Ok(NextRoute::NotYet);
         }
-        if index >= count {
-            return None;
-        }
-        let (start, is_from_boundary) = if index == 0 {
-            (stations.place(own(0)), false)
-        } else {
-            (crossing(index - 1), true)
-        };
-        let mut cursor = self.cursor;
-        let mut pieces = 1_u16;
-        let mut span = None;
-        while index < count && is_before(index) {
-            let at = table.word(Column::Front, own(index));
-            cursor.seek(job, &self.direction, fine(at));
-            let crossed = span.map_or(0, |span: u16| cursor.span().abs_diff(span));
-            span = Some(cursor.span());
-            pieces = pieces.saturating_add(1 + crossed);
-            index += 1;
-        }
-        let (end, is_beyond) = if index < count {
-            (crossing(index - 1), true)
-        } else {
-            (stations.place(own(count - 1)), false)
-        };
-        self.after = index;
-        while index < count && !is_before(index) {
-            index += 1;
-        }
-        let front = FrontLine {
-            direction: self.direction,
-            stations,
-            swapped,
-            cursor: self.cursor,
-            are_on_boundary: [is_from_boundary, is_beyond],
-            pieces,
-        };
-        self.is_last_part = index >= count;
-        Some(Route {
-            side: SpanParameter { span: 0, fraction: 0 },
-            reversed,
-            ends: [start, end],
-            front: Some(front),
-        })
+        let (route, is_last) = self.part_search.take(self.advance.stations(), self.cursor);
+        self.is_last_part = is_last;
+        self.seek_first_part(job);
+        let route = route.ok_or(Fault::new(FaultKind::IntervalTooSmall, 0.0))?;
+        Ok(NextRoute::Pass(route))
+    }
+}
+
+/// Whether the front of this number is travelled backwards.
+const fn is_reversed(pattern: Pattern, fronts: u32, part: u8) -> bool {
+    match pattern {
+        Pattern::Zigzag => fronts % 2 == 1,
+        // The other direction keeps the side on which the material is.
+        Pattern::Zig => part == 1,
     }
 }
