@@ -19,9 +19,10 @@ use protocol::{
     frame::{Decoder, FRAME_MAX, FrameError, write_reply},
     message::{
         Activity, Batch, Capabilities, Clock, Configuration, Description, Excess, FaultReport, Homing,
-        InputLines, JogWay, LinkTimeoutAction, MotionEnd, MotionStatus, Offsets, PassDigest, Profile,
-        ProfileLimit, Reason, Reply, Report, Request, ResetCause, SafetyStatus, SampleRecord, SpindleOrder,
-        SpindleSettings, Status, StepSettings, StreamStatus, Turning, Words, read_reply, read_request,
+        InputLines, JogWay, Journal, LinkTimeoutAction, MotionEnd, MotionStatus, Offsets, PassDigest,
+        Profile, ProfileLimit, Reason, Reply, Report, Request, ResetCause, SafetyStatus, SampleRecord,
+        SpindleOrder, SpindleSettings, Status, StepSettings, StreamStatus, Turning, Words, read_reply,
+        read_request,
     },
 };
 
@@ -83,6 +84,7 @@ fn profile() -> Profile {
         spindle: Some(SpindleSettings {
             max_rpm: 24_000,
             at_speed_ticks: 3_000,
+            stops_at_pause: true,
         }),
     }
 }
@@ -166,6 +168,9 @@ fn requests() -> Vec<Request> {
             rpm: 12_000,
             coolant: true,
         }),
+        Request::Pause,
+        Request::StartAt { pass: 300 },
+        Request::Journal,
         Request::JobBegin {
             header: Header {
                 axes: Some(axes()),
@@ -322,6 +327,7 @@ fn reasons() -> Vec<Reason> {
         Reason::ProbeTripped,
         Reason::NoSpindle,
         Reason::RowsGone,
+        Reason::WholeOnly,
     ]
 }
 
@@ -397,6 +403,15 @@ fn replies() -> Vec<Reply> {
         Reply::Room {
             event: 303,
             room: 20_000,
+        },
+        Reply::Journal {
+            number: 8,
+            journal: Some(Journal {
+                job: 0x0123_4567_89ab_cdef,
+                profile: 0x9abc_def0,
+                pass: 300,
+                is_finished: true,
+            }),
         },
     ]);
     replies

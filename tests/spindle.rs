@@ -44,6 +44,7 @@ impl Desk {
         profile.spindle = Some(SpindleSettings {
             max_rpm: MAX_RPM,
             at_speed_ticks: AT_SPEED,
+            stops_at_pause: true,
         });
         desk.ask(&Request::SetProfile(Some(profile))).unwrap();
         desk.load();

@@ -8,7 +8,7 @@ use interp_core::{
     job::{Header, STORE_WORDS, stream::RecordCopy},
     steps::{BUFFER_WORDS, CheckedSteps, StepConfig},
 };
-use protocol::message::{Description, InputLines, MotionStatus, Offsets, Profile, Reason, Status};
+use protocol::message::{Description, InputLines, Journal, MotionStatus, Offsets, Profile, Reason, Status};
 
 use crate::{
     link::Link,
@@ -17,7 +17,7 @@ use crate::{
     realtime::{RealTime, TickInput},
     safety::Order,
     settings::Settings,
-    storage::StorageError,
+    storage::{JOURNAL_SLOT, Kind, Storage, StorageError},
 };
 
 /// Capacity of the instruction queue, as in the firmware.
@@ -42,6 +42,7 @@ struct Half<const WORDS: usize> {
     commands: VecDeque<Instruction>,
     lines: InputLines,
     settings: Settings<RamFlash<SECTOR>>,
+    journal: Storage<RamFlash<SECTOR>, JOURNAL_SLOT>,
 }
 
 /// Bytes of a sector of the board's flash.
@@ -108,6 +109,15 @@ impl<const WORDS: usize> Machine for Half<WORDS> {
         self.settings.keep_offsets(offsets)
     }
 
+    fn journal(&mut self) -> Option<Journal> {
+        let newest = self.journal.newest(Kind::Journal)?;
+        Journal::read(newest.bytes())
+    }
+
+    fn keep_journal(&mut self, journal: &Journal) -> Result<(), StorageError> {
+        self.journal.keep(Kind::Journal, &journal.write())
+    }
+
     fn own_steps(&mut self) -> StepConfig {
         StepConfig::DEFAULT
     }
@@ -153,11 +163,12 @@ pub struct Board<const WORDS: usize = STORE_WORDS> {
     link: Link,
     sent: Vec<u8>,
     carriages: [i32; 3],
+    periods: u32,
 }
 
 impl<const WORDS: usize> Default for Board<WORDS> {
     fn default() -> Self {
-        Self::with_flash(RamFlash::new())
+        Self::with_flash([RamFlash::new(), RamFlash::new()])
     }
 }
 
@@ -169,12 +180,13 @@ impl<const WORDS: usize> Board<WORDS> {
     }
 
     /// A board after power-up, with what its flash has.
-    fn with_flash(flash: RamFlash<SECTOR>) -> Self {
+    fn with_flash([settings, journal]: [RamFlash<SECTOR>; 2]) -> Self {
         let mut half = Half {
             real_time: RealTime::default(),
             commands: VecDeque::new(),
             lines: InputLines::NONE,
-            settings: Settings::open(flash),
+            settings: Settings::open(settings),
+            journal: Storage::open(journal),
         };
         let mut link = Link::new();
         link.power_up(&mut half);
@@ -183,13 +195,14 @@ impl<const WORDS: usize> Board<WORDS> {
             link,
             sent: Vec::new(),
             carriages: [0; 3],
+            periods: 0,
         }
     }
 
     /// Cuts the power, and restores it.
     #[must_use]
     pub fn power_cycle(self) -> Self {
-        Self::with_flash(self.half.settings.into_flash())
+        Self::with_flash([self.half.settings.into_flash(), self.half.journal.into_flash()])
     }
 
     /// Receives bytes from the host.
@@ -235,6 +248,8 @@ impl<const WORDS: usize> Board<WORDS> {
             self.link
                 .event(&event, &mut |bytes| sent.extend_from_slice(bytes));
         }
+        self.periods = self.periods.wrapping_add(1);
+        self.link.keep_journal(self.periods, &mut self.half);
     }
 
     /// Adds the pulses of a period to the carriages, with pins 0 to 2 as the axes' step pins.

@@ -89,10 +89,21 @@ impl Link {
     pub fn event(&mut self, event: &Event, out: &mut impl FnMut(&[u8])) {
         match event {
             Event::Sample(sample) => self.sample(sample, out),
-            Event::Pass(pass) => self.pass(pass, out),
+            Event::Pass(pass) => {
+                self.session.note_pass(pass);
+                self.pass(pass, out);
+            }
             Event::Room(room) => self.room(*room, out),
-            Event::Halted(status) => self.halted(status, out),
+            Event::Halted(status) => {
+                self.session.note_halt(status);
+                self.halted(status, out);
+            }
         }
+    }
+
+    /// Journals what of a run is due. To be called once a period or more often; `now`: periods since power-up.
+    pub fn keep_journal(&mut self, now: u32, machine: &mut impl Machine) {
+        self.session.keep_journal(now, machine);
     }
 
     /// Adds a sample, and writes the frame once it is full.

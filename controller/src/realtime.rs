@@ -326,6 +326,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         if matches!(command, Some(Command::Start | Command::Resume)) {
             command = self.with_spindle(command);
         }
+        self.control.pauses |= command == Some(Command::Pause);
         let starts = command == Some(Command::Start);
         if starts && Command::Start.is_allowed(self.interpolator.state()) {
             command = self.begin();
@@ -345,8 +346,8 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         };
         if moves(state) {
             self.count_sample(events);
-        } else if self.control.host_is_gone {
-            self.host_left(state);
+        } else if self.control.host_is_gone || self.control.pauses {
+            self.came_to_rest(state);
         }
         if (was_under_way || starts) && !state.is_under_way() {
             self.end_run(events);

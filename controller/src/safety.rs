@@ -44,6 +44,8 @@ pub enum Order {
     Move(Motion),
     /// Spindle and coolant of the loaded job.
     Spindle(SpindleOrder),
+    /// The pass with which the next run begins.
+    BeginAt(u32),
     /// Configuration of the machine.
     Configure(Configuration),
     /// Drives on or off.
@@ -296,7 +298,7 @@ impl Safety {
                 self.home_nm = home_nm;
                 self.status.homed = true;
             }
-            Order::SetUp(_) | Order::Spindle(_) => {}
+            Order::SetUp(_) | Order::Spindle(_) | Order::BeginAt(_) => {}
             Order::Move(_) => self.may_move()?,
         }
         Ok(())

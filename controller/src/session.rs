@@ -5,19 +5,22 @@ use interp_core::{
     command::Command,
     fault::{Fault, FaultKind},
     job::Header,
+    sample::State,
     steps::{StepConfig, StepConfigError},
 };
 use protocol::{
     frame::{DELIMITER, FRAME_MAX, Frame, write_reply},
     message::{
-        Activity, Capabilities, Clock, Configuration, Excess, NO_NUMBER, OVERRIDE_MAX_PERCENT, Offsets,
-        Profile, ProfileLimit, Reason, Reply, Request, Status, StepSettings, next_number, read_request,
+        Activity, Capabilities, Clock, Configuration, Excess, Journal, NO_NUMBER, OVERRIDE_MAX_PERCENT,
+        Offsets, PassDigest, Profile, ProfileLimit, Reason, Reply, Request, Status, StepSettings, job_mark,
+        next_number, read_request,
     },
     version::PROTOCOL_VERSION,
 };
 
 use crate::{
     history::History,
+    journal::Journalling,
     machine::{Busy, Instruction, Machine},
     manual::{Motion, Setup},
     safety::Order,
@@ -27,7 +30,7 @@ use crate::{
 
 /// Maximum length of an answer stored for a retransmission, bytes: a frame of a `Profile` with every varint at its maximum length. That of a
 /// `Status` is shorter.
-const ANSWER_MAX: usize = 198;
+const ANSWER_MAX: usize = 199;
 
 /// State of the session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -98,6 +101,9 @@ pub(crate) struct Session {
     profile: u32,
     /// The job was loaded under another profile.
     is_outdated: bool,
+    /// [`job_mark`] of the job whose runs are journalled; none where the loaded one's are not.
+    job: Option<u64>,
+    journalling: Journalling,
 }
 
 impl Session {
@@ -113,6 +119,8 @@ impl Session {
             steps: None,
             profile: 0,
             is_outdated: false,
+            job: None,
+            journalling: Journalling::NONE,
         }
     }
 
@@ -179,6 +187,49 @@ impl Session {
             frames_bad: self.frames_bad,
             events: self.events.last(),
             ..status
+        }
+    }
+
+    /// Journals that a run of the loaded job begins at a pass.
+    #[inline(never)]
+    fn journal_start(&mut self, machine: &mut impl Machine, pass: u32) {
+        self.journalling = Journalling::NONE;
+        if let Some(journal) = self.journal(pass, false) {
+            // A run is not hindered by a journal that is full, or absent.
+            let _ = machine.keep_journal(&journal);
+        }
+    }
+
+    /// How far a run of the loaded job came, if its runs are journalled.
+    fn journal(&self, pass: u32, is_finished: bool) -> Option<Journal> {
+        self.job.map(|job| Journal {
+            job,
+            profile: self.profile,
+            pass,
+            is_finished,
+        })
+    }
+
+    /// A pass of a run is over.
+    pub(crate) fn note_pass(&mut self, pass: &PassDigest) {
+        self.journalling
+            .note(self.journal(pass.pass.saturating_add(1), false));
+    }
+
+    /// A run has come to its end, or to that of its ticks.
+    pub(crate) fn note_halt(&mut self, status: &Status) {
+        if status.state == State::Finished {
+            self.journalling.note(self.journal(status.pass, true));
+        } else if !status.state.is_under_way() {
+            // Its last pass is not complete.
+            self.journalling = Journalling::NONE;
+        }
+    }
+
+    /// Journals what is due.
+    pub(crate) fn keep_journal(&mut self, now: u32, machine: &mut impl Machine) {
+        if let Some(journal) = self.journalling.due(now) {
+            let _ = machine.keep_journal(&journal);
         }
     }
 
@@ -302,6 +353,12 @@ impl Session {
                     motion: machine.motion(),
                 };
             }
+            Request::Journal => {
+                return Reply::Journal {
+                    number,
+                    journal: machine.journal(),
+                };
+            }
             Request::Offsets => {
                 return Reply::Offsets {
                     number,
@@ -335,12 +392,16 @@ impl Session {
                 None => Err(Reason::NoUpload),
             },
             Request::JobEnd => self.job_end(machine),
-            Request::Start | Request::Hold | Request::Resume | Request::Abort | Request::Stop => {
-                match request.command() {
-                    Some(command) => self.operate(machine, command),
-                    None => Err(Reason::Unreadable),
-                }
-            }
+            Request::Start
+            | Request::Hold
+            | Request::Resume
+            | Request::Abort
+            | Request::Stop
+            | Request::Pause => match request.command() {
+                Some(command) => self.operate(machine, command, 0),
+                None => Err(Reason::Unreadable),
+            },
+            Request::StartAt { pass } => self.operate(machine, Command::Start, pass),
             Request::Override { percent } => set_override(machine, percent),
             Request::Configure(configuration) => configure(machine, configuration),
             Request::Drives { on } => machine.order(Order::Drives { on }),
@@ -390,7 +451,9 @@ impl Session {
             return Err(beyond(excess));
         }
         self.commanded = false;
-        self.upload = Some(Upload::begin(machine, header, words, digest)?);
+        let upload = Upload::begin(machine, header, words, digest)?;
+        self.job = (header.axes.is_some() && !upload.is_streamed()).then(|| job_mark(header, digest));
+        self.upload = Some(upload);
         self.is_outdated = false;
         // Those of the job before are not for this one.
         let own = own_steps(machine);
@@ -414,10 +477,13 @@ impl Session {
         upload.finish(machine)
     }
 
-    /// Queues a command if the state permits it.
+    /// Queues a command if the state permits it. `pass`: the one that a start begins with.
     #[inline(never)]
-    fn operate(&mut self, machine: &mut impl Machine, command: Command) -> Result<(), Reason> {
-        let ends = matches!(command, Command::Hold | Command::Stop | Command::Abort);
+    fn operate(&mut self, machine: &mut impl Machine, command: Command, pass: u32) -> Result<(), Reason> {
+        let ends = matches!(
+            command,
+            Command::Hold | Command::Stop | Command::Abort | Command::Pause
+        );
         if ends && machine.motion().activity != Activity::Rest {
             return machine.order(Order::Move(Motion::Stop));
         }
@@ -430,8 +496,18 @@ impl Session {
                 return Err(Reason::OtherProfile);
             }
             machine.may_start()?;
+            if pass > 0 {
+                machine.order(Order::BeginAt(pass))?;
+            }
         }
-        instruct(machine, Instruction::Command(command))?;
+        let sent = instruct(machine, Instruction::Command(command));
+        if sent.is_err() && pass > 0 {
+            machine.order(Order::BeginAt(0))?;
+        }
+        sent?;
+        if command == Command::Start {
+            self.journal_start(machine, pass);
+        }
         self.commanded = true;
         Ok(())
     }
@@ -451,6 +527,7 @@ const fn needs_rest(request: &Request) -> bool {
         request,
         Request::JobBegin { .. }
             | Request::Start
+            | Request::StartAt { .. }
             | Request::Clock(_)
             | Request::StepConfig(_)
             | Request::SetProfile(_)
@@ -583,7 +660,7 @@ pub(crate) fn send(reply: &Reply, out: &mut impl FnMut(&[u8])) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use interp_core::sample::{SpanParameter, State};
+    use interp_core::sample::SpanParameter;
     use protocol::message::{FaultReport, InputLines, Report, SafetyStatus, StreamStatus};
 
     #[test]
@@ -673,6 +750,7 @@ mod tests {
             spindle: Some(protocol::message::SpindleSettings {
                 max_rpm: u32::MAX,
                 at_speed_ticks: u32::MAX,
+                stops_at_pause: true,
             }),
         };
         let longest = Reply::Profile {

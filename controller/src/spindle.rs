@@ -63,6 +63,11 @@ impl Spindle {
         self.waits = 0;
     }
 
+    /// Whether it stands while the tool is lifted for a pause.
+    pub(crate) fn stops_at_pause(&self) -> bool {
+        self.settings.is_none_or(|settings| settings.stops_at_pause)
+    }
+
     /// Takes the order for the next run.
     pub(crate) fn order(&mut self, order: SpindleOrder) -> Result<(), Reason> {
         if order != SpindleOrder::OFF {

@@ -1,6 +1,6 @@
 //! Records in flash that survive a power cut at any instant.
 //!
-//! Two sectors, each divided into slots of [`SLOT`] bytes. A record is appended to the active sector: sequence number, kind, payload, then a CRC-32;
+//! Two sectors, each divided into slots, of [`SLOT`] bytes for settings and [`JOURNAL_SLOT`] for a journal. A record is appended to the active sector: sequence number, kind, payload, then a CRC-32;
 //! one that was not written to its end does not count. The active sector is that of the newest record. When it is full the other one goes on, with a
 //! copy of what is in force. **An erase stops the processor for seconds**, so it happens at power-up only ([`Storage::open`]): then the spare sector is erased,
 //! and a record in the active one says so. Without that record it is erased again, because an erase that was cut short may leave bits that read differently
@@ -12,18 +12,20 @@
 //! | 4, 5 | kind, length of the payload |
 //! | 6, 7 | 0xff |
 //! | 8 .. | payload |
-//! | 252 to 255 | CRC-32 of the bytes before, low byte first |
+//! | last four | CRC-32 of the bytes before, low byte first |
 
 use embedded_storage::nor_flash::NorFlash;
 use protocol::frame::crc32;
 
-/// Bytes of a slot.
+/// Bytes of a slot of settings.
 pub const SLOT: usize = 256;
+/// Bytes of a slot of a journal: 4096 in a sector of 128 KB.
+pub const JOURNAL_SLOT: usize = 32;
 
 /// Bytes before the payload, and longest payload.
 const HEAD: usize = 8;
 const CRC: usize = 4;
-/// Longest payload of a record, bytes.
+/// Longest payload of a record of settings, bytes.
 pub const PAYLOAD_MAX: usize = SLOT - HEAD - CRC;
 
 /// The value of erased flash.
@@ -39,11 +41,13 @@ pub enum Kind {
     Profile = 1,
     /// Work offsets and tool length.
     Offsets = 2,
+    /// How far a run came.
+    Journal = 3,
 }
 
 impl Kind {
     /// The kinds whose newest record is in force.
-    const KEPT: [Self; 2] = [Self::Profile, Self::Offsets];
+    const KEPT: [Self; 3] = [Self::Profile, Self::Offsets, Self::Journal];
 }
 
 /// Flash could not be written: what was kept before is still kept.
@@ -52,12 +56,12 @@ pub struct StorageError;
 
 /// The payload of the newest record of a kind.
 #[derive(Clone, Copy, Debug)]
-pub struct Payload {
+pub struct Payload<const SLOT: usize = 256> {
     bytes: [u8; SLOT],
     length: usize,
 }
 
-impl Payload {
+impl<const SLOT: usize> Payload<SLOT> {
     /// Its bytes.
     #[must_use]
     pub fn bytes(&self) -> &[u8] {
@@ -67,14 +71,14 @@ impl Payload {
 
 /// A slot's content.
 #[allow(clippy::large_enum_variant, reason = "there is no allocator to box with")]
-enum Content {
+enum Content<const SLOT: usize> {
     Blank,
     /// Neither blank nor a record: its writing was cut short.
     Broken,
     Record {
         sequence: u32,
         kind: u8,
-        payload: Payload,
+        payload: Payload<SLOT>,
     },
 }
 
@@ -93,13 +97,15 @@ struct Active {
 
 /// Records in two sectors of a flash of `2 * F::ERASE_SIZE` bytes, in which single bytes can be written.
 #[derive(Debug)]
-pub struct Storage<F> {
+pub struct Storage<F, const SLOT: usize = 256> {
     flash: F,
     active: Active,
 }
 
-impl<F: NorFlash> Storage<F> {
+impl<F: NorFlash, const SLOT: usize> Storage<F, SLOT> {
     const SLOTS: u32 = (F::ERASE_SIZE / SLOT) as u32;
+    /// Longest payload, bytes.
+    const PAYLOAD_MAX: usize = SLOT - HEAD - CRC;
 
     /// Finds the records; erases the spare sector if it is not known to be erased, which takes up to some seconds.
     pub fn open(flash: F) -> Self {
@@ -156,7 +162,7 @@ impl<F: NorFlash> Storage<F> {
     }
 
     /// The payload of the newest record of a kind, if there is one.
-    pub fn newest(&mut self, kind: Kind) -> Option<Payload> {
+    pub fn newest(&mut self, kind: Kind) -> Option<Payload<SLOT>> {
         let active = self.active.sector;
         let found = self
             .newest_in(active, kind)
@@ -165,8 +171,8 @@ impl<F: NorFlash> Storage<F> {
     }
 
     /// The newest record of a kind in a sector, with its sequence number.
-    fn newest_in(&mut self, sector: u32, kind: Kind) -> Option<(u32, Payload)> {
-        let mut newest: Option<(u32, Payload)> = None;
+    fn newest_in(&mut self, sector: u32, kind: Kind) -> Option<(u32, Payload<SLOT>)> {
+        let mut newest: Option<(u32, Payload<SLOT>)> = None;
         for slot in 0..Self::SLOTS {
             if let Content::Record {
                 sequence,
@@ -185,7 +191,7 @@ impl<F: NorFlash> Storage<F> {
     /// Keeps a record of a kind in place of the one before.
     ///
     /// # Errors
-    /// The payload is longer than [`PAYLOAD_MAX`], the flash fails, or it is full until the next power-up.
+    /// The payload is longer than a slot has room for, the flash fails, or it is full until the next power-up.
     pub fn keep(&mut self, kind: Kind, payload: &[u8]) -> Result<(), StorageError> {
         if self.active.next >= Self::SLOTS {
             self.swap()?;
@@ -252,7 +258,7 @@ impl<F: NorFlash> Storage<F> {
         (sector * Self::SLOTS + slot) * SLOT as u32
     }
 
-    fn slot(&mut self, sector: u32, slot: u32) -> Content {
+    fn slot(&mut self, sector: u32, slot: u32) -> Content<SLOT> {
         // Most slots are blank: a look at their head is enough, because it is written first.
         let mut head = [0; HEAD];
         let mut bytes = [0; SLOT];
@@ -270,7 +276,7 @@ impl<F: NorFlash> Storage<F> {
         let [a, b, c, d, kind, length, ..] = *data else {
             return Content::Broken;
         };
-        if crc32(data).to_le_bytes() != *crc || usize::from(length) > PAYLOAD_MAX {
+        if crc32(data).to_le_bytes() != *crc || usize::from(length) > Self::PAYLOAD_MAX {
             return Content::Broken;
         }
         Content::Record {

@@ -6,7 +6,7 @@ use controller::{
     realtime::RealTime,
     safety::Order,
     settings::Settings,
-    storage::StorageError,
+    storage::{JOURNAL_SLOT, Kind, Storage, StorageError},
 };
 use heapless::spsc::Producer;
 use interp_core::{
@@ -14,16 +14,19 @@ use interp_core::{
     job::{Header, stream::RecordCopy},
     steps::{CheckedSteps, StepConfig},
 };
-use protocol::message::{Description, InputLines, MotionStatus, Offsets, Profile, Reason, Status};
+use protocol::message::{Description, InputLines, Journal, MotionStatus, Offsets, Profile, Reason, Status};
 use rtic::Mutex;
 
 use crate::{
-    board::{self, BOARD, SettingsFlash},
+    board::{self, BOARD, JournalFlash, SettingsFlash},
     design_parameters::{FIRMWARE_VERSION, JOB_WORDS, PERIOD_US},
 };
 
 /// The real-time half of this board.
 pub(crate) type BoardRealTime = RealTime<&'static mut [i32; JOB_WORDS]>;
+
+/// The journal of this board.
+pub(crate) type BoardJournal = Storage<JournalFlash, JOURNAL_SLOT>;
 
 /// [`Machine`] by means of RTIC. Every lock is held for one call of [`RealTime`], each of bounded length: a
 /// chunk of words, a record, or a copy of the status.
@@ -34,6 +37,8 @@ pub(crate) struct GuardedMachine<'a, M> {
     pub(crate) commands: &'a mut Producer<'static, Instruction>,
     /// The machine's profile.
     pub(crate) settings: &'a mut Settings<SettingsFlash>,
+    /// How far the last run came.
+    pub(crate) journal: &'a mut BoardJournal,
 }
 
 impl<M: Mutex<T = BoardRealTime>> GuardedMachine<'_, M> {
@@ -106,6 +111,15 @@ impl<M: Mutex<T = BoardRealTime>> Machine for GuardedMachine<'_, M> {
 
     fn keep_offsets(&mut self, offsets: &Offsets) -> Result<(), StorageError> {
         self.settings.keep_offsets(offsets)
+    }
+
+    fn journal(&mut self) -> Option<Journal> {
+        let newest = self.journal.newest(Kind::Journal)?;
+        Journal::read(newest.bytes())
+    }
+
+    fn keep_journal(&mut self, journal: &Journal) -> Result<(), StorageError> {
+        self.journal.keep(Kind::Journal, &journal.write())
     }
 
     fn own_steps(&mut self) -> StepConfig {

@@ -60,7 +60,7 @@ mod app {
             watchdog::Watchdog,
         },
         events::{EventMemory, EventSource},
-        guarded_machine::{BoardRealTime, GuardedMachine},
+        guarded_machine::{BoardJournal, BoardRealTime, GuardedMachine},
         plan_task,
         sample_task::{Guards, SampleTask},
         watch::Watch,
@@ -89,6 +89,7 @@ mod app {
         transmitter: Transmitter,
         led: StatusLed<Output>,
         settings: Settings<board::SettingsFlash>,
+        journal: BoardJournal,
         bytes_in: Producer<'static, u8>,
         bytes_out: Consumer<'static, u8>,
         commands_in: Producer<'static, Instruction>,
@@ -135,6 +136,7 @@ mod app {
         }
         // Before the first tick, because an erase stops the processor.
         let settings = Settings::open(board.settings);
+        let journal = BoardJournal::open(board.journal);
         let timer = SampleTimer::new(board.tim2, board.tim5, board::TIMER_RELOAD, PERIOD_COUNTS);
         let mut real_time = RealTime::with_store(context.local.store);
         real_time.set_tick_budget(TICK_BUDGET_CYCLES);
@@ -168,6 +170,7 @@ mod app {
                 transmitter,
                 led: StatusLed::new(Output::new(LED.pin), LED.active),
                 settings,
+                journal,
                 bytes_in,
                 bytes_out,
                 commands_in,
@@ -241,13 +244,14 @@ mod app {
     /// | a miss | in lockstep time waits for it; on a free clock events are lost once their queue is full, and counted (`samples_lost`) |
     #[idle(
         shared = [real_time],
-        local = [transmitter, led, settings, bytes_out, commands_in, events_out]
+        local = [transmitter, led, settings, journal, bytes_out, commands_in, events_out]
     )]
     fn idle(context: idle::Context) -> ! {
         let idle::LocalResources {
             transmitter,
             led,
             settings,
+            journal,
             bytes_out,
             commands_in,
             events_out,
@@ -258,6 +262,7 @@ mod app {
             real_time,
             commands: commands_in,
             settings,
+            journal,
         };
         transmitter.listen();
         let mut link = Link::new();
@@ -278,6 +283,7 @@ mod app {
                 link.flush(&mut send);
                 last_event = None;
             }
+            link.keep_journal(now, &mut machine);
             if watch.is_due(now) {
                 watch.look(now, &mut machine, bytes_lost());
                 led.show(watch.state, now);

@@ -27,11 +27,21 @@ pub enum Command {
     /// Running or held: give the run up, and leave the surface: with limits, the tool slows down along its path and retracts to the safe
     /// height, which is a link like any other; without, as an abort.
     Stop = 5,
+    /// Running or held: hold, and leave the surface: with limits, the tool slows down along its path and retracts to the safe height, a link like
+    /// any other, where it is held. The next resume brings it back to the same place, and the run continues. Without limits, as a hold.
+    Pause = 6,
 }
 
 impl Command {
     /// Every command.
-    pub const ALL: [Self; 5] = [Self::Start, Self::Hold, Self::Resume, Self::Abort, Self::Stop];
+    pub const ALL: [Self; 6] = [
+        Self::Start,
+        Self::Hold,
+        Self::Resume,
+        Self::Abort,
+        Self::Stop,
+        Self::Pause,
+    ];
 
     /// The command's name in scripts and on the command line.
     #[must_use]
@@ -42,6 +52,7 @@ impl Command {
             Self::Resume => "resume",
             Self::Abort => "abort",
             Self::Stop => "stop",
+            Self::Pause => "pause",
         }
     }
 
@@ -59,7 +70,7 @@ impl Command {
             Self::Hold => matches!(state, State::Running | State::Linking),
             Self::Resume => matches!(state, State::Held | State::Holding),
             Self::Abort => matches!(state, State::Faulted) || Self::Stop.is_allowed(state),
-            Self::Stop => matches!(
+            Self::Stop | Self::Pause => matches!(
                 state,
                 State::Running | State::Linking | State::Holding | State::Held
             ),

@@ -63,6 +63,18 @@ impl<S> Interpolator<S> {
 }
 
 impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
+    /// The pass with which the next run begins, of a job with axis limits; 0 at power-up, after each start and each load. The passes before it are skipped in the
+    /// planning while the tool stands: those from it on are the same as in a run of the whole job.
+    pub const fn begin_at(&mut self, pass: u32) {
+        self.motion.sequencer.begin_at(pass);
+    }
+
+    /// Whether the tool has left the surface for a pause, and is held above it.
+    #[must_use]
+    pub fn is_lifted(&self) -> bool {
+        self.motion.state == State::Held && self.motion.sequencer.is_lifted()
+    }
+
     /// Begins to load a job of `words` data words; the previous job is dropped, and the machine is idle.
     ///
     /// # Errors
@@ -308,6 +320,8 @@ enum Ending {
     Retract,
     /// The retract is under way, as a link.
     Retracting,
+    /// Stop, then retract, and be held there.
+    Lift,
 }
 
 impl Motion {
@@ -342,6 +356,7 @@ impl Motion {
         self.program.begin(header, words, capacity)?;
         self.state = State::Idle;
         self.fault = None;
+        self.sequencer.begin_at(0);
         Ok(())
     }
 
@@ -515,6 +530,7 @@ impl Motion {
             (Ok(Outcome::Link), State::Running) => self.state = State::Linking,
             (Ok(Outcome::Finished), _) if self.ending == Ending::Retracting => self.state = State::Ready,
             (Ok(Outcome::Finished), _) => self.state = State::Finished,
+            (Ok(Outcome::Lifted), State::Linking) => self.state = State::Held,
             (Ok(_), _) => {}
             (Err(fault), _) => self.fail(fault),
         }
@@ -523,6 +539,15 @@ impl Motion {
     /// The tool has come to the commanded standstill: sets the next state of the run. Returns whether the period is complete.
     fn stand(&mut self) -> bool {
         match self.state {
+            State::Holding if self.ending == Ending::Lift => {
+                // A link like any other.
+                self.ending = Ending::Stand;
+                self.state = if self.sequencer.lift(&self.run) {
+                    State::Linking
+                } else {
+                    State::Held
+                };
+            }
             State::Holding => self.state = State::Held,
             State::Stopping if self.fault.is_some() => self.state = State::Faulted,
             State::Stopping if self.ending == Ending::Retract => {
@@ -598,15 +623,33 @@ impl Motion {
                         if let Some(axes) = &job.header.axes {
                             let first = run.first_route(&job);
                             sequencer.restart(first, axes);
+                            run.expect_pass(sequencer.first_pass());
                         }
                         State::Linking
                     }
                     _ => State::Running,
                 }
             }
+            Command::Pause if has_limits => {
+                // A stop that retracts is on its way up already.
+                if self.ending != Ending::Retracting {
+                    self.ending = Ending::Lift;
+                }
+                State::Holding
+            }
             Command::Hold if has_limits => State::Holding,
-            Command::Hold => State::Held,
-            Command::Resume if has_limits && self.sequencer.is_link() => State::Linking,
+            Command::Hold | Command::Pause => State::Held,
+            Command::Resume if has_limits => {
+                if self.ending == Ending::Lift {
+                    self.ending = Ending::Stand;
+                }
+                self.sequencer.come_back();
+                if self.sequencer.is_link() {
+                    State::Linking
+                } else {
+                    State::Running
+                }
+            }
             Command::Resume => State::Running,
             Command::Abort | Command::Stop if has_limits && self.state != State::Faulted => {
                 self.ending = if command == Command::Stop {

@@ -64,6 +64,7 @@
 //! | a probe move while the probe is tripped | `Nak`, `ProbeTripped` | |
 //! | a spindle on a machine without one | `Nak`, `NoSpindle` | |
 //! | a start of a streamed job whose first rows were overwritten | `Nak`, `RowsGone` | |
+//! | a start at a pass, of a job without axis limits or of a streamed one | `Nak`, `WholeOnly` | |
 //! | a `Repeat` of an event that is not kept any more | `Nak`, `EventGone` with the first that is | |
 //!
 //! Where the last column is empty, nothing has changed. An event that the line damages is lost: the host sees it by the numbers of the
@@ -95,6 +96,7 @@ mod codes;
 pub mod digest;
 pub mod frame;
 mod frame_error;
+mod journal;
 mod manual;
 pub mod message;
 mod profile;

@@ -53,6 +53,9 @@
 //! | 27 | `Offsets` | | `Offsets` |
 //! | 28 | `SetOffsets` | the fields of [`Offsets`] | `Ack`, and it holds, also after a power cut |
 //! | 29 | `Spindle` | turning (a byte: 0 off, 1 clockwise, 2 counterclockwise), speed (1/min, `u32`), coolant (a byte) | as `Configure`; for the runs of the loaded job |
+//! | 30 | `Pause` | | as `Start` |
+//! | 31 | `StartAt` | pass `u32` | as `Start`; a job with axis limits that is not streamed |
+//! | 32 | `Journal` | | `Journal` |
 //!
 //! Header: kind, pattern, spacing, tool side (a byte each), spans along path and side (`u16`), ball radius (mm), feed (mm/s),
 //! scallop height (mm), period (s) (`f32`), window of a streamed job (rows, `u16`; 0 for another one); then 0, or 1 and the axes' limits: velocity (mm/s), acceleration (mm/s^2), jerk (mm/s^3)
@@ -76,6 +79,7 @@
 //! | 8 | `Motion` | number, the fields of [`MotionStatus`]; an answer |
 //! | 9 | `Offsets` | number, the fields of [`Offsets`]; an answer |
 //! | 10 | `Room` | event `u32`, words up to which there is room `u32` |
+//! | 11 | `Journal` | number, option of the fields of [`Journal`]; an answer |
 //!
 //! A parameter is its span (`u16`) and fraction. `Halted` comes when the ticks of a `Run` are used up, or when a run ends
 //! (finished, faulted, aborted), whichever is first.
@@ -108,6 +112,7 @@
 use interp_core::{command::Command, job::Header};
 use serde::{Deserialize, Serialize};
 
+pub use crate::journal::{JOURNAL_BYTES, Journal, job_mark};
 pub use crate::manual::{
     Activity, Homing, JogWay, MotionEnd, MotionStatus, NO_AXIS, OFFSETS_BYTES_MAX, Offsets, WORK_OFFSETS,
 };
@@ -262,6 +267,15 @@ pub enum Request {
     SetOffsets(Offsets),
     /// Spindle and coolant of the loaded job: on from the start of each run to its end. Refused while a run is under way.
     Spindle(SpindleOrder),
+    /// Hold, and leave the surface; `Resume` comes back to the same place.
+    Pause,
+    /// Run the job from the beginning of a pass, as a run of the whole job would have it. Jobs with axis limits only.
+    StartAt {
+        /// The pass, from 0.
+        pass: u32,
+    },
+    /// Asks for the run that was under way last, also before a power cut.
+    Journal,
 }
 
 impl From<Command> for Request {
@@ -272,6 +286,7 @@ impl From<Command> for Request {
             Command::Resume => Self::Resume,
             Command::Abort => Self::Abort,
             Command::Stop => Self::Stop,
+            Command::Pause => Self::Pause,
         }
     }
 }
@@ -286,6 +301,7 @@ impl Request {
             Self::Resume => Command::Resume,
             Self::Abort => Command::Abort,
             Self::Stop => Command::Stop,
+            Self::Pause => Command::Pause,
             _ => return None,
         })
     }
@@ -392,6 +408,13 @@ pub enum Reply {
         event: u32,
         /// Words up to which there is room.
         room: u32,
+    },
+    /// Answer to `Journal`.
+    Journal {
+        /// Number of the request.
+        number: u16,
+        /// The last run; none where the board has journalled none.
+        journal: Option<Journal>,
     },
 }
 
@@ -504,9 +527,9 @@ mod tests {
     #[test]
     fn codes_out_of_range_are_no_header() {
         let good = [1, 1, 0, 0, 0, 0, 1, 1];
-        let rest = [0; 4 * 4 + 1 + 1 + 1 + 1 + 8];
+        let rest = [0; 4 * 4 + 1 + 1 + 1 + 1 + 1 + 8];
         for (place, code) in [(2, 4), (3, 2), (4, 4), (5, 2)] {
-            let mut payload = [0; 8 + 28];
+            let mut payload = [0; 8 + 29];
             payload[..8].copy_from_slice(&good);
             payload[8..].copy_from_slice(&rest);
             assert!(read_request(&payload).is_ok());

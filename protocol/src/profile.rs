@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::{frame, manual::Homing, records::StepSettings, safety::Configuration, spindle::SpindleSettings};
 
 /// Longest encoding of a [`Profile`], bytes: every varint at its maximum length.
-pub const PROFILE_BYTES_MAX: usize = 187;
+pub const PROFILE_BYTES_MAX: usize = 188;
 
 /// Greatest axis limit that a profile may have, in mm and seconds: far above any machine, and within `f32` whatever is computed of it.
 const LIMIT_MAX: f32 = 1e9;
@@ -315,6 +315,7 @@ mod tests {
             spindle: Some(SpindleSettings {
                 max_rpm: u32::MAX,
                 at_speed_ticks: u32::MAX,
+                stops_at_pause: true,
             }),
             ..PROFILE
         };

@@ -152,6 +152,8 @@ pub enum Reason {
     NoSpindle,
     /// 31: a start of a streamed job whose first rows were overwritten: it has to be loaded again.
     RowsGone,
+    /// 32: a start at a pass, of a job without axis limits or of a streamed one.
+    WholeOnly,
 }
 
 impl Reason {
@@ -191,6 +193,7 @@ impl Reason {
             Self::ProbeTripped => 29,
             Self::NoSpindle => 30,
             Self::RowsGone => 31,
+            Self::WholeOnly => 32,
         }
     }
 
@@ -357,6 +360,10 @@ impl fmt::Display for Reason {
             Self::RowsGone => write!(
                 formatter,
                 "the first part of the job was overwritten while it ran: load it again"
+            ),
+            Self::WholeOnly => write!(
+                formatter,
+                "only a job with axis limits that fits into the board's store can begin at a pass"
             ),
         }
     }

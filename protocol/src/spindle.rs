@@ -44,4 +44,6 @@ pub struct SpindleSettings {
     pub max_rpm: u32,
     /// Periods from switching on to the first motion.
     pub at_speed_ticks: u32,
+    /// It is switched off while the tool is lifted for a pause.
+    pub stops_at_pause: bool,
 }

@@ -199,7 +199,9 @@ impl Bench {
             Order::Configure(_) | Order::Drives { on: false } => !under_way,
             Order::Drives { on: true } => !under_way && stops | rules.latched == 0,
             Order::SetHome { .. } => !under_way && rules.drives,
-            Order::SetUp(_) | Order::Move(_) | Order::Spindle(_) => unreachable!("not tried here"),
+            Order::SetUp(_) | Order::Move(_) | Order::Spindle(_) | Order::BeginAt(_) => {
+                unreachable!("not tried here")
+            }
         };
         prop_assert_eq!(self.half.order(order).is_ok(), allowed, "{:?}", order);
         if allowed {
@@ -208,7 +210,7 @@ impl Bench {
                 Order::Configure(_) => {}
                 Order::Drives { on } => (rules.drives, rules.homed) = (on, on && rules.homed),
                 Order::SetHome { .. } => rules.homed = true,
-                Order::SetUp(_) | Order::Move(_) | Order::Spindle(_) => {}
+                Order::SetUp(_) | Order::Move(_) | Order::Spindle(_) | Order::BeginAt(_) => {}
             }
         }
         self.follows_the_rules(&self.half.status())

@@ -20,7 +20,7 @@ use protocol::{
     digest::job_digest,
     frame::{Decoder, FRAME_MAX, write_request},
     message::{
-        Description, InputLines, MotionStatus, NO_NUMBER, Offsets, Profile, Reason, Reply, Request,
+        Description, InputLines, Journal, MotionStatus, NO_NUMBER, Offsets, Profile, Reason, Reply, Request,
         SafetyStatus, Status, Words, next_number, read_reply,
     },
 };
@@ -183,6 +183,8 @@ pub struct Mock {
     pub profile: Option<Profile>,
     /// The work offsets that it keeps.
     pub offsets: Offsets,
+    /// Its journal.
+    pub journal: Option<Journal>,
 }
 
 impl Machine for Mock {
@@ -253,6 +255,15 @@ impl Machine for Mock {
 
     fn keep_offsets(&mut self, offsets: &Offsets) -> Result<(), StorageError> {
         self.offsets = *offsets;
+        Ok(())
+    }
+
+    fn journal(&mut self) -> Option<Journal> {
+        self.journal
+    }
+
+    fn keep_journal(&mut self, journal: &Journal) -> Result<(), StorageError> {
+        self.journal = Some(*journal);
         Ok(())
     }
 

@@ -54,6 +54,8 @@ pub(super) struct Control {
     pub(super) from_home: bool,
     /// The run is to be held because the host is gone.
     pub(super) host_is_gone: bool,
+    /// The run is to be held above the surface.
+    pub(super) pauses: bool,
     /// The step outputs lead to drives.
     pub(super) has_drives: bool,
     /// Words of a streamed job up to which there was room, as last reported.
@@ -79,6 +81,7 @@ impl Control {
             levels: 0,
             from_home: true,
             host_is_gone: false,
+            pauses: false,
             has_drives: false,
             room: 0,
         }

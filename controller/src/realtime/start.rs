@@ -46,6 +46,13 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
                 }
             }
             Order::Spindle(order) => self.control.spindle.order(order)?,
+            Order::BeginAt(pass) => {
+                let begins_anywhere = self.interpolator.has_limits() && !self.interpolator.is_streamed();
+                if pass > 0 && !begins_anywhere {
+                    return Err(Reason::WholeOnly);
+                }
+                self.interpolator.begin_at(pass);
+            }
             Order::Drives { .. } | Order::Configure(_) | Order::Acknowledge => {}
         }
         Ok(())
@@ -90,6 +97,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
     #[inline(never)]
     pub(super) fn begin(&mut self) -> Option<Command> {
         if self.may_start().is_err() {
+            self.interpolator.begin_at(0);
             return None;
         }
         match self.interpolator.home_nm() {
@@ -117,6 +125,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
             _ => state == State::Held,
         };
         self.control.host_is_gone = false;
+        self.control.pauses = false;
         let waits = may && !self.control.spindle.is_ready() && self.control.clock == Clock::Free;
         if waits {
             self.control.command = command;
@@ -130,12 +139,15 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         self.control.command == Some(Command::Start) && self.control.spindle.output() != 0
     }
 
-    /// The run came to rest because the host is gone: the spindle too.
+    /// The run came to rest, because the host is gone or for a pause: the spindle too, with a pause only above the surface and if the profile says so.
     #[cold]
     #[inline(never)]
-    pub(super) fn host_left(&mut self, state: State) {
+    pub(super) fn came_to_rest(&mut self, state: State) {
+        let stops = self.control.host_is_gone
+            || (self.interpolator.is_lifted() && self.control.spindle.stops_at_pause());
         self.control.host_is_gone = false;
-        if state == State::Held {
+        self.control.pauses = false;
+        if state == State::Held && stops {
             self.control.spindle.off();
         }
     }

@@ -12,7 +12,7 @@ use stm32f4xx_hal::{
 use super::{BOARD, Board, take_reset_cause};
 use crate::{
     design_parameters::{PERIOD_US, SERIAL_BAUD},
-    drivers::gpio,
+    drivers::{gpio, settings_flash::sectors},
 };
 
 /// The processor's clock, MHz: the chip's maximum.
@@ -87,6 +87,7 @@ pub(crate) fn init(device: pac::Peripherals) -> Board {
     device.DBGMCU.apb2_fz().modify(|_, w| w.dbg_tim1_stop().set_bit());
 
     begin_speed_output(&device.TIM12);
+    let (settings, journal) = sectors(device.FLASH);
 
     Board {
         tim1: device.TIM1,
@@ -95,7 +96,8 @@ pub(crate) fn init(device: pac::Peripherals) -> Board {
         dma2: device.DMA2,
         usart1: device.USART1,
         iwdg: device.IWDG,
-        settings: SettingsFlash::new(device.FLASH),
+        settings,
+        journal,
         reset,
     }
 }
@@ -103,7 +105,7 @@ pub(crate) fn init(device: pac::Peripherals) -> Board {
 /// The safety inputs are pins.
 pub(crate) use crate::drivers::gpio::Ports as InputPorts;
 /// Settings are kept in the chip's flash.
-pub(crate) use crate::drivers::settings_flash::SettingsFlash;
+pub(crate) use crate::drivers::settings_flash::{JournalFlash, SettingsFlash};
 
 /// This board has pins of its own.
 pub(crate) fn simulate(_lines: InputLines) -> bool {

@@ -15,7 +15,7 @@
 //! | `SERIAL_DIVIDER` | `BRR` of USART1 |
 //! | `init` | sets up the clocks; returns the peripherals for the drivers |
 //! | `InputPorts` | source of the safety inputs: the chip's ports, or simulated ones |
-//! | `SettingsFlash` | where settings are kept |
+//! | `SettingsFlash`, `JournalFlash` | where settings and the journal are kept |
 //! | `simulate` | sets the simulated inputs of a board without pins |
 //! | `stop_for_good` | final state after a processor fault |
 //!
@@ -40,16 +40,16 @@ compile_error!("choose one board: `cargo fw-qemu`, `cargo fw-chip` or `cargo fw-
 mod qemu;
 #[cfg(feature = "board-qemu")]
 pub(crate) use qemu::{
-    BOARD, InputPorts, SERIAL_DIVIDER, STEP_TIMER_HZ, SettingsFlash, TIME_IS_SIMULATED, TIMER_HZ,
-    TIMER_RELOAD, init, simulate, stop_for_good,
+    BOARD, InputPorts, JournalFlash, SERIAL_DIVIDER, STEP_TIMER_HZ, SettingsFlash, TIME_IS_SIMULATED,
+    TIMER_HZ, TIMER_RELOAD, init, simulate, stop_for_good,
 };
 
 #[cfg(not(feature = "board-qemu"))]
 mod chip;
 #[cfg(not(feature = "board-qemu"))]
 pub(crate) use chip::{
-    InputPorts, SERIAL_DIVIDER, STEP_TIMER_HZ, SettingsFlash, TIME_IS_SIMULATED, TIMER_HZ, TIMER_RELOAD,
-    init, simulate, stop_for_good,
+    InputPorts, JournalFlash, SERIAL_DIVIDER, STEP_TIMER_HZ, SettingsFlash, TIME_IS_SIMULATED, TIMER_HZ,
+    TIMER_RELOAD, init, simulate, stop_for_good,
 };
 
 #[cfg(feature = "board-stm32f405")]
@@ -136,6 +136,8 @@ pub(crate) struct Board {
     pub(crate) iwdg: pac::IWDG,
     /// Where settings are kept.
     pub(crate) settings: SettingsFlash,
+    /// Where the journal is kept.
+    pub(crate) journal: JournalFlash,
     /// Why the chip started.
     pub(crate) reset: ResetCause,
 }

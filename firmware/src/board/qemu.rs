@@ -61,12 +61,15 @@ pub(crate) fn init(device: pac::Peripherals) -> Board {
         usart1: device.USART1,
         iwdg: device.IWDG,
         settings: SettingsFlash::new(),
+        journal: JournalFlash::new(),
         reset: take_reset_cause(&device.RCC),
     }
 }
 
 /// QEMU's flash cannot be written: settings are kept as long as QEMU runs.
 pub(crate) type SettingsFlash = RamFlash<512>;
+/// No journal: nothing survives the end of QEMU.
+pub(crate) type JournalFlash = RamFlash<0>;
 
 /// Simulated input registers of the ports: the inputs set by the host, initially none.
 static INPUTS: [AtomicU32; Port::ALL.len()] = [const { AtomicU32::new(0) }; Port::ALL.len()];

@@ -267,6 +267,10 @@ impl Chip {
         match when {
             When::Start(seconds) => self.world.cycles(seconds),
             When::Motion(after) => self.moved.map_or(NEVER, |moved| self.world.cycles(moved + after)),
+            When::Pulses(count) => {
+                let pulses = self.machine.as_ref().map_or(0, Machine::pulses);
+                if pulses >= count { self.world.now } else { NEVER }
+            }
         }
     }
 

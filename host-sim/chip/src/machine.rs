@@ -32,6 +32,7 @@ pub(crate) struct Machine {
     /// The switches that the carriages press, and since when, in periods.
     pressed: [Option<u64>; 7],
     periods: u64,
+    pulses: u64,
 }
 
 /// The switches that carriages press, in the order of [`Machine::pressed`].
@@ -76,6 +77,7 @@ impl Machine {
             bounce: 0,
             pressed: [None; 7],
             periods: 0,
+            pulses: 0,
         };
         let mut start = [0.0; 3];
         for entry in text.split(';').filter(|entry| !entry.is_empty()) {
@@ -110,6 +112,11 @@ impl Machine {
         Ok(machine)
     }
 
+    /// Step pulses that have moved a carriage.
+    pub(crate) const fn pulses(&self) -> u64 {
+        self.pulses
+    }
+
     /// Where the carriages are, mm.
     pub(crate) fn at_mm(&self) -> [f64; 3] {
         std::array::from_fn(|axis| self.steps[axis] as f64 / self.steps_per_mm[axis])
@@ -125,6 +132,7 @@ impl Machine {
             let lines = board.axis(axis);
             let is = |line: Line| line.is_active(ports[line.pin.port.index()].odr);
             if risen & lines.step.pin.bit() != 0 && is(lines.enable) {
+                self.pulses += 1;
                 self.steps[index] += if is(lines.direction) != self.reversed[index] {
                     1
                 } else {

@@ -29,7 +29,7 @@ pub(crate) struct Options {
     /// Phase of the host's bytes.
     #[arg(long, default_value_t = 1)]
     pub(crate) seed: u64,
-    /// An event: MS:WHAT after power-on, or motion+MS:WHAT after the first step pulse. WHAT is an input that opens (emergency-stop, drive-fault,
+    /// An event: MS:WHAT after power-on, motion+MS:WHAT after the first step pulse, or pulses+N:WHAT with the N-th pulse of a machine's carriages. WHAT is an input that opens (emergency-stop, drive-fault,
     /// x-min to z-max), an input that closes (x-min=closed), hang, fault or brown-out.
     #[arg(long, value_name = "EVENT")]
     pub(crate) at: Vec<String>,

@@ -22,6 +22,8 @@ pub(crate) enum When {
     Start(f64),
     /// After the first step pulse.
     Motion(f64),
+    /// With this number of step pulses of a machine's carriages.
+    Pulses(u64),
 }
 
 /// An event and its time, as on the command line: `500:x-max`, `motion+20:emergency-stop`, `motion+40:hang`, `900:drive-fault=closed`.
@@ -62,9 +64,14 @@ pub(crate) fn entry(text: &str, board: &Board) -> Result<Entry, String> {
         text.parse::<f64>()
             .map_err(|_| format!("{text}: not a time in ms"))
     };
-    let when = match when.strip_prefix("motion+") {
-        Some(after) => When::Motion(ms(after)? / 1e3),
-        None => When::Start(ms(when)? / 1e3),
+    let when = match (when.strip_prefix("motion+"), when.strip_prefix("pulses+")) {
+        (Some(after), _) => When::Motion(ms(after)? / 1e3),
+        (_, Some(count)) => When::Pulses(
+            count
+                .parse()
+                .map_err(|_| format!("{count}: not a number of pulses"))?,
+        ),
+        _ => When::Start(ms(when)? / 1e3),
     };
     let name = what.to_owned();
     let (what, closed) = what

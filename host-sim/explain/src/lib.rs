@@ -291,6 +291,7 @@ mod tests {
             Reason::ProbeTripped,
             Reason::NoSpindle,
             Reason::RowsGone,
+            Reason::WholeOnly,
         ]
     }
 

@@ -3,7 +3,7 @@
 use super::{Entry, Family};
 
 /// In the order of codes.
-pub(super) const ENTRIES: [Entry; 32] = [
+pub(super) const ENTRIES: [Entry; 33] = [
     reason(
         0,
         "bad-frame",
@@ -291,6 +291,15 @@ pub(super) const ENTRIES: [Entry; 32] = [
         "Such a job is sent while it runs; the store then holds the part that the tool was on last.",
         "Send the job again: `cargo sim run` does so before each start.",
         "A second start of a job of 100 x 100 patches, without an upload.",
+    ),
+    reason(
+        32,
+        "whole-only",
+        "A start at a pass of a job that can only be run as a whole.",
+        "None.",
+        "It has no axis limits, so no way leads to the pass; or it is larger than the board's store and sent while it runs.",
+        "Give the machine a profile with limits; divide a larger job into several.",
+        "`run --resume` of a job of 100 x 100 patches.",
     ),
 ];
 

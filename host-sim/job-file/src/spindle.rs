@@ -48,7 +48,7 @@ pub(super) fn read(section: &Section<'_>, profile: Option<&MachineProfile>) -> R
 
 /// Reads that of a profile.
 pub(super) fn read_drive(section: &Section<'_>) -> Result<SpindleDrive, JobError> {
-    section.only(&["max_rpm", "at_speed_ms"], &[])?;
+    section.only(&["max_rpm", "at_speed_ms", "stops_at_pause"], &[])?;
     let at_speed_ms = if section.has("at_speed_ms") {
         let value = section.number("at_speed_ms")?;
         if !(0.0..=AT_SPEED_MAX_MS).contains(&value) {
@@ -66,5 +66,6 @@ pub(super) fn read_drive(section: &Section<'_>) -> Result<SpindleDrive, JobError
     Ok(SpindleDrive {
         max_rpm: rpm(section, "max_rpm")?.max(1),
         at_speed_ms,
+        stops_at_pause: !section.has("stops_at_pause") || section.switch("stops_at_pause")?,
     })
 }

@@ -128,6 +128,8 @@ pub struct SpindleDrive {
     pub max_rpm: u32,
     /// Time from switching on to the first motion, ms.
     pub at_speed_ms: f64,
+    /// It is switched off while the tool is lifted for a pause.
+    pub stops_at_pause: bool,
 }
 
 /// A machine as its board keeps it: the greatest limits, the drives, the supervision. A job may lower the limits, but not exceed them.

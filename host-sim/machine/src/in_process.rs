@@ -12,6 +12,7 @@ use crate::prepare::Prepared;
 pub struct Machine {
     core: Box<Interpolator<Vec<i32>>>,
     steps: Option<(Steps, Box<[u32; BUFFER_WORDS]>)>,
+    first_pass: u32,
 }
 
 impl Machine {
@@ -36,10 +37,14 @@ impl Machine {
         // The board and the reader of the job file refuse an invalid configuration before this point.
         let checked = job.steps.and_then(|config| config.check().ok());
         let steps = checked.map(|checked| (Steps::new(checked, [0, 1, 2]), Box::new([0; BUFFER_WORDS])));
-        Ok(Self { core, steps })
+        Ok(Self {
+            core,
+            steps,
+            first_pass: job.first_pass,
+        })
     }
 
-    /// Runs the job from its beginning, and calls `each` with every sample, until its end or a fault. Stops early and returns
+    /// Runs the job from the beginning of its first pass, and calls `each` with every sample, until its end or a fault. Stops early and returns
     /// `Ok` when `each` returns `false`.
     ///
     /// # Errors
@@ -47,6 +52,7 @@ impl Machine {
     pub fn run(&mut self, mut each: impl FnMut(&Sample) -> bool) -> Result<(), Fault> {
         // A fault of the run before is acknowledged by an abort; otherwise it is ignored.
         self.core.tick(Command::Abort);
+        self.core.begin_at(self.first_pass);
         let mut command = Some(Command::Start);
         let mut pass = None;
         let has_limits = self.core.has_limits();
@@ -82,6 +88,12 @@ impl Machine {
         self.core.tick(inputs);
         self.core.plan();
         self.core.last()
+    }
+
+    /// Whether the tool is held above the surface, for a pause.
+    #[must_use]
+    pub fn is_lifted(&self) -> bool {
+        self.core.is_lifted()
     }
 
     /// State after the last period.

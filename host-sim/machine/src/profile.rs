@@ -34,6 +34,7 @@ pub fn for_board(profile: &MachineProfile) -> Profile {
         spindle: profile.spindle.map(|spindle| SpindleSettings {
             max_rpm: spindle.max_rpm,
             at_speed_ticks: ticks(spindle.at_speed_ms),
+            stops_at_pause: spindle.stops_at_pause,
         }),
         step_inverted: bits(profile.step_inverted),
         enable_inverted: bits(profile.enable_inverted),
@@ -93,6 +94,7 @@ pub fn of_board(profile: &Profile) -> MachineProfile {
         spindle: spindle.map(|spindle| SpindleDrive {
             max_rpm: spindle.max_rpm,
             at_speed_ms: f64::from(spindle.at_speed_ticks) * PERIOD_DEFAULT_US / US_PER_MS,
+            stops_at_pause: spindle.stops_at_pause,
         }),
     }
 }
@@ -237,6 +239,7 @@ pub fn text(profile: &MachineProfile) -> String {
     if let Some(spindle) = spindle {
         line(format_args!("\n[spindle]\nmax_rpm = {}", spindle.max_rpm));
         line(format_args!("at_speed_ms = {:?}", spindle.at_speed_ms));
+        line(format_args!("stops_at_pause = {}", spindle.stops_at_pause));
     }
     text
 }
@@ -273,6 +276,7 @@ contact = "normally-open"
 [spindle]
 max_rpm = 24000
 at_speed_ms = 2500
+stops_at_pause = false
 "#;
 
     /// What is kept by a board is what its text says, and the text again.

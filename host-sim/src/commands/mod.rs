@@ -27,6 +27,7 @@ mod part_words;
 mod progress;
 mod reach_words;
 mod region_words;
+mod resume;
 mod run;
 mod scripted;
 mod settings;

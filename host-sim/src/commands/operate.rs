@@ -47,6 +47,8 @@ enum OperatorCommand {
     Hold,
     /// Continues a held run. If the board holds a run whose host is gone (`host_gone = "hold"`), the command then follows it to its end.
     Resume,
+    /// Decelerates, leaves the surface and is held there, with the spindle off; `resume` comes back to the same place.
+    Pause,
     /// Decelerates, retracts and ends the run; the job stays loaded.
     Stop,
     /// Decelerates and ends the run in place; acknowledges its fault.
@@ -99,6 +101,7 @@ impl OperatorCommand {
             Self::Status => Request::Status,
             Self::Hold => Command::Hold.into(),
             Self::Resume => Command::Resume.into(),
+            Self::Pause => Command::Pause.into(),
             Self::Stop => Command::Stop.into(),
             Self::Abort => Command::Abort.into(),
             Self::Override { percent } => Request::Override { percent: *percent },

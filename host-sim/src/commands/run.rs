@@ -14,6 +14,7 @@ use super::home::{self, PositionNm};
 use super::operate::sentence;
 use super::out::{say, to_stderr};
 use super::outcome::Outcome;
+use super::resume;
 use super::simulate::{WantedReport, remarks, report, surveyed, timed};
 use super::typed::{Console, WORDS};
 use super::{
@@ -32,7 +33,7 @@ use machine::remote::{RemoteError, Session, drive, port};
 use machine::travel;
 
 /// Runs a job on the firmware and compares every sample with the simulation: in QEMU, on a board, or with a board's image executed on models of
-/// its chip. While a board runs, type operator commands and Enter: hold, resume, stop, abort, override 50, status. A run with operator commands
+/// its chip. While a board runs, type operator commands and Enter: hold, pause, resume, stop, abort, override 50, status. A run with operator commands
 /// is not compared.
 ///
 /// Example: cargo sim run jobs/freeform.toml --qemu
@@ -41,6 +42,7 @@ use machine::travel;
 /// Example: cargo sim run jobs/plate_machine.toml --qemu --machine machine.toml
 /// Example: cargo sim run jobs/plate_machine.toml --port /dev/ttyUSB0 --home 40,30,40
 /// Example: cargo sim run part.toml --port /dev/ttyUSB0 --work 1
+/// Example: cargo sim run part.toml --port /dev/ttyUSB0 --work 1 --resume
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {
@@ -74,7 +76,10 @@ pub(super) struct Arguments {
     /// Places the job's origin at this work offset of the board (operate touch, zero). Default: the job's coordinates are the machine's.
     #[arg(long, value_name = "N", requires = "port", value_parser = super::axes::work_number())]
     work: Option<u8>,
-    /// Applies the operator commands in this file, in lockstep: lines `tick N: hold`, or resume, stop, abort, start, override P.
+    /// Goes on with the run of this job that a power cut, a fault or an abort has ended, at the beginning of the pass that was not complete. The axes have to be homed.
+    #[arg(long, requires = "port")]
+    resume: bool,
+    /// Applies the operator commands in this file, in lockstep: lines `tick N: hold`, or pause, resume, stop, abort, start, override P.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["port", "report", "trace"])]
     script: Option<PathBuf>,
     /// Prints one JSON object instead of text.
@@ -420,10 +425,10 @@ fn agree(arguments: &Arguments, wanted: Option<&MachineProfile>, session: &mut S
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let jobs = job_file::jobs_of(&arguments.job)?;
     let several = jobs.len() > 1;
-    if several && (arguments.trace.is_some() || arguments.script.is_some()) {
+    if several && (arguments.trace.is_some() || arguments.script.is_some() || arguments.resume) {
         return Err(Failure::input(
             format!(
-                "the job has {} faces, --trace and --script are for one",
+                "the job has {} faces, --trace, --script and --resume are for one",
                 jobs.len()
             ),
             format!("name the face: {}", jobs[0].display()),
@@ -475,7 +480,10 @@ struct Ran {
 
 fn run_job(arguments: &Arguments, path: &Path, several: bool, bench: &mut Bench) -> Result<Ran> {
     let (profile, origin) = (bench.profile, bench.origin);
-    let (job, prepared) = home::load(path, profile.as_ref(), origin, bench.stands)?;
+    let (job, mut prepared) = home::load(path, profile.as_ref(), origin, bench.stands)?;
+    if let (true, Some((_, session))) = (arguments.resume, &mut bench.connected) {
+        prepared.first_pass = resume::first_pass(session, &prepared)?;
+    }
     travel::check(&job)?;
     let folder = arguments.report.as_ref().map(|folder| match several {
         true => folder.join(path.file_name().unwrap_or(path.as_os_str())),
@@ -565,6 +573,9 @@ fn run_job(arguments: &Arguments, path: &Path, several: bool, bench: &mut Bench)
                 "  origin       work offset {number}, at {} mm of the machine",
                 origin.words()
             );
+        }
+        if arguments.resume {
+            say!("  resumed      at pass {}", prepared.first_pass);
         }
         outcome.print(page.as_deref());
         let (speed, missed) = (run.ticks_per_second.round(), run.status.deadline_misses);

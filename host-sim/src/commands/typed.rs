@@ -12,7 +12,7 @@ use machine::remote::RemoteError;
 use machine::remote::operate::Operator;
 
 /// The commands, for the prompt.
-pub(super) const WORDS: &str = "hold, resume, stop, abort, override 50, status";
+pub(super) const WORDS: &str = "hold, pause, resume, stop, abort, override 50, status";
 
 /// The operator at the terminal: reads lines from standard input, prints the answers above the progress bar.
 pub(super) struct Console {

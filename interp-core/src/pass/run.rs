@@ -429,6 +429,28 @@ impl Run {
         Ok(())
     }
 
+    /// The sample of the place where the tool stands on a pass, after it was away from there.
+    ///
+    /// # Errors
+    /// As [`Self::advance`].
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn show(&mut self, last: &mut Sample) -> Result<()> {
+        let before = self.travel.log_speed_derivative_before;
+        // The period is counted already.
+        let ticks = self.travel.ticks;
+        self.travel.ticks = last.tick;
+        self.sample(last)?;
+        (self.travel.log_speed_derivative_before, self.travel.ticks) = (before, ticks);
+        self.describe(0.0, last);
+        Ok(())
+    }
+
+    /// The number of the pass that the tool is on its way to.
+    pub(crate) const fn expect_pass(&mut self, pass: u32) {
+        self.travel.pass = pass;
+    }
+
     /// A period at standstill.
     pub(crate) const fn stand(&mut self, last: &mut Sample) {
         last.tick = self.travel.ticks;

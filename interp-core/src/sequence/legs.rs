@@ -27,6 +27,10 @@ pub(super) enum Goal {
     Home,
     /// The safe height, above the tool's position.
     SafeHeight,
+    /// The same, to wait there.
+    Lift,
+    /// The place that a pause has led away from.
+    Back,
 }
 
 /// Planning of a leg.
@@ -87,7 +91,8 @@ impl Sequencer {
         let [x, y, z] = match self.goal {
             Goal::Pass => next.ends[0],
             Goal::Home => axes.home_nm,
-            Goal::SafeHeight => from,
+            Goal::SafeHeight | Goal::Lift => from,
+            Goal::Back => self.back.at,
         };
         let height_nm = match self.goal {
             // A straight link that could not begin in time goes at the safe height.
@@ -107,9 +112,10 @@ impl Sequencer {
             check_faces_up(next.faces_up[0])?;
         }
         check_travel(axes, &to)?;
+        let comes_down = (is_approach || self.goal == Goal::Back) && leg == Leg::Plunge;
         let slow_mm = if is_approach && self.is_straight {
             f32::MAX
-        } else if is_approach && leg == Leg::Plunge {
+        } else if comes_down {
             axes.plunge_mm
         } else {
             0.0
@@ -142,6 +148,8 @@ impl Sequencer {
             (Leg::Retract, Goal::SafeHeight) | (Leg::Plunge, Goal::Home | Goal::SafeHeight) => {
                 self.phase = Phase::Done;
             }
+            (Leg::Retract, Goal::Lift) => self.phase = Phase::Lifted,
+            (Leg::Plunge, Goal::Back | Goal::Lift) => self.phase = self.back.phase,
             (Leg::Retract, _) => self.await_goal(Leg::Traverse),
             (Leg::Traverse, _) => self.await_goal(Leg::Plunge),
             (Leg::Plunge, Goal::Pass) => self.phase = Phase::Leg(Leg::Plunge),
@@ -170,6 +178,10 @@ impl Sequencer {
         run.off_surface(self.straight.position(), self.straight.progress.speed(), last);
         if is_over {
             self.end_leg(leg);
+            if self.phase == Phase::Pass {
+                // Back from a pause: the sample of the place at which the pass was left.
+                run.show(last)?;
+            }
         }
         Ok(())
     }

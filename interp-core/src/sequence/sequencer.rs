@@ -14,6 +14,7 @@ use crate::feed::profile::Profiles;
 use crate::feed::turn::Turn;
 use crate::job::program::{Job, Link, Program};
 use crate::job::{AxisLimits, Pattern};
+use crate::math::arith::count_to_f32;
 use crate::math::number::{Bounded, to_f32};
 use crate::pass::front::NextRoute;
 use crate::pass::route::Route;
@@ -24,6 +25,7 @@ use crate::sequence::hop::Hop;
 use crate::sequence::legs::{Goal, Leg, LegPlanning};
 use crate::sequence::link::{BoundaryEnd, BoundaryStepOver, StraightMove, check_faces_up};
 use crate::sequence::lookahead::{Lookahead, PassPlan, has_turns};
+use crate::sequence::pause::Return;
 use crate::sequence::turning::{Part, road};
 
 /// Periods that a pass takes longer than the planning of the next one.
@@ -77,6 +79,8 @@ pub(super) enum Phase {
     Pass,
     /// The tool is in a turn from pass to pass.
     Turn,
+    /// The tool is held at the safe height, for a pause.
+    Lifted,
     /// The sequence is over.
     Done,
 }
@@ -90,6 +94,8 @@ pub(crate) enum Outcome {
     Link,
     /// The last sample was emitted.
     Finished,
+    /// The tool has retracted for a pause, and waits.
+    Lifted,
 }
 
 /// Planning of the next pass.
@@ -150,7 +156,7 @@ pub(crate) struct Sequencer {
     /// The turn that the tool is in, or was last.
     pub(super) turn: Turn,
     pub(super) straight: StraightMove,
-    hop: Hop,
+    pub(super) hop: Hop,
     /// Whether the hop to the next pass is to be planned.
     has_hop: bool,
     step_over: BoundaryStepOver,
@@ -174,6 +180,11 @@ pub(crate) struct Sequencer {
     correction: Option<Correction>,
     /// Whether the rows of patches are there that the planning of the pass after the next needs.
     has_rows: bool,
+    /// Where a pause leads back to.
+    pub(super) back: Return,
+    /// The first pass of the next run, and of this one: those before it are skipped.
+    wanted_pass: u32,
+    first_pass: u32,
 }
 
 /// The plans of the current or last pass, and of the next.
@@ -216,11 +227,26 @@ impl Sequencer {
         cell: [0; 2],
         correction: None,
         has_rows: false,
+        back: Return::NONE,
+        wanted_pass: 0,
+        first_pass: 0,
     };
+
+    /// Sets the pass with which the next run begins.
+    pub(crate) const fn begin_at(&mut self, pass: u32) {
+        self.wanted_pass = pass;
+    }
+
+    /// The pass with which this run begins.
+    pub(crate) const fn first_pass(&self) -> u32 {
+        self.first_pass
+    }
 
     /// Starts the job from the tool's position.
     pub(crate) fn restart(&mut self, first: Route, axes: &AxisLimits) {
+        self.first_pass = core::mem::take(&mut self.wanted_pass);
         self.at.get_or_insert(axes.home_nm);
+        self.back = Return::NONE;
         self.phase = Phase::Await;
         self.second = false;
         self.on_surface = false;
@@ -258,7 +284,7 @@ impl Sequencer {
             Phase::StepOver => self.step_over.progress.is_at_rest(),
             Phase::Leg(_) => self.straight.progress.is_at_rest(),
             Phase::Hop => self.hop.is_at_rest(),
-            Phase::Await | Phase::AwaitGoal(_) | Phase::Done => true,
+            Phase::Await | Phase::AwaitGoal(_) | Phase::Lifted | Phase::Done => true,
         }
     }
 
@@ -322,7 +348,7 @@ impl Sequencer {
             Phase::Leg(_) => self.straight.progress.has_work(),
             Phase::Hop => self.hop.has_work(),
             Phase::AwaitGoal(leg) => self.has_to_plan_leg(leg),
-            Phase::Await | Phase::Done => false,
+            Phase::Await | Phase::Lifted | Phase::Done => false,
         };
         let wants_more = self.phase == Phase::Pass && self.feed_factor > 1.0;
         is_busy
@@ -538,6 +564,10 @@ impl Sequencer {
                 if let (Some(estimator), _) = run.estimator_and_lines() {
                     estimator.enter_row(next.route.side.span);
                 }
+                if pass == self.first_pass {
+                    // It begins at rest, wherever the pass before it would have led.
+                    now.tail = Turn::NONE;
+                }
                 self.lookahead.begin(pass, next.route, &now.tail, next);
                 next.is_last = run.is_last_pass();
                 self.planning = Planning::Stations;
@@ -547,6 +577,9 @@ impl Sequencer {
                 self.pending = self.lookahead.work(job, axes, estimator, lines, next).err();
                 if self.lookahead.is_done() {
                     next.is_last |= next.next.is_none() && !job.header.spacing.is_constant();
+                    if next.pass < self.first_pass {
+                        return self.skip(run);
+                    }
                     self.planning = if next.point {
                         Planning::Complete
                     } else {
@@ -611,6 +644,19 @@ impl Sequencer {
             }
             Planning::Complete => {}
         }
+    }
+
+    /// Goes on to the pass after one that is skipped, as if the tool had been on it.
+    fn skip(&mut self, run: &mut Run) {
+        let (_, next) = both(&mut self.plans, self.second);
+        if self.pending.is_some() {
+            return;
+        }
+        if next.is_last {
+            self.pending = Some(Fault::new(FaultKind::WrongState, count_to_f32(next.pass)));
+            return;
+        }
+        self.swap(run);
     }
 
     /// Plans what is ahead anew where the override asks for more than the plans give.
@@ -695,6 +741,9 @@ impl Sequencer {
             self.follow_link(job, run, command, last)?;
         }
         self.at = Some(last.cl_nm);
+        if self.phase == Phase::Lifted {
+            return Ok(Outcome::Lifted);
+        }
         // The first and the last sample of a pass belong to the pass.
         Ok(if was_link && self.is_link() {
             Outcome::Link
@@ -848,7 +897,7 @@ impl Sequencer {
             Phase::Hop | Phase::Leg(_) | Phase::AwaitGoal(_) => {
                 Some(next).filter(|_| self.goal == Goal::Pass && is_located)
             }
-            Phase::Await | Phase::Pass | Phase::Done => None,
+            Phase::Await | Phase::Pass | Phase::Lifted | Phase::Done => None,
         }
     }
 

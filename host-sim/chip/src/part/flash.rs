@@ -1,14 +1,15 @@
-//! The flash interface (RM0090, 3) and the two sectors that keep settings. The sectors of the program cannot be written here.
+//! The flash interface (RM0090, 3) and the four sectors that keep journal and settings. The sectors of the program cannot be written here.
 //!
 //! The processor waits while a byte is written or a sector erased, because it fetches from the same bank. The supply may fail in any of these operations.
 
 use crate::world::World;
 
 /// First address and bytes of the sectors, and the number of the first.
-pub(crate) const SETTINGS: u32 = 0x080c_0000;
-pub(crate) const SETTINGS_BYTES: u32 = 2 * SECTOR;
+pub(crate) const SETTINGS: u32 = 0x0808_0000;
+pub(crate) const SETTINGS_BYTES: u32 = SECTORS * SECTOR;
 const SECTOR: u32 = 128 * 1024;
-const FIRST: u32 = 10;
+const FIRST: u32 = 8;
+const SECTORS: u32 = 4;
 
 const KEYS: [u32; 2] = [0x4567_0123, 0xcdef_89ab];
 
@@ -125,7 +126,7 @@ impl Flash {
         let sector = self.cr >> 3 & 0x1f;
         if self.cr & SER == 0
             || self.cr & (PG | MER) != 0
-            || !(FIRST..FIRST + 2).contains(&sector)
+            || !(FIRST..FIRST + SECTORS).contains(&sector)
             || self.is_cut
         {
             if !self.is_cut {

@@ -282,6 +282,7 @@ fn finish(
     words.extend(widths(job, &path)?);
     words.extend(records);
     Ok(Prepared {
+        first_pass: 0,
         header,
         words,
         path,

@@ -66,6 +66,8 @@ pub struct Prepared {
     pub along: Along,
     /// Step output, if the job gives one.
     pub steps: Option<StepConfig>,
+    /// The pass with which a run begins: 0, or where a run that was cut short is resumed.
+    pub first_pass: u32,
 }
 
 impl Prepared {
@@ -199,6 +201,7 @@ fn revolved(
     words.extend(widths(job, &path)?);
     words.extend(record.to_words());
     Ok(Prepared {
+        first_pass: 0,
         header: Header { kind, ..header },
         words,
         path,

@@ -45,6 +45,7 @@ pub fn upload(
     mut progress: impl FnMut(usize),
 ) -> Result<(), RemoteError> {
     session.set_feed(None);
+    session.set_first_pass(job.first_pass);
     let words = u32::try_from(job.words.len()).unwrap_or(u32::MAX);
     let digest = job_digest(&job.words);
     session.command(&Request::JobBegin {
@@ -104,7 +105,10 @@ fn start(session: &mut Session, report: Report, lockstep: Option<u32>) -> Result
         Some(_) => session.set_keep_alive(None),
     }
     session.begin_run()?;
-    session.command(&Request::Start)?;
+    session.command(&match session.first_pass() {
+        0 => Request::Start,
+        pass => Request::StartAt { pass },
+    })?;
     lockstep.map_or(Ok(()), |ticks| session.command(&Request::Run { ticks }))
 }
 
@@ -112,6 +116,8 @@ fn start(session: &mut Session, report: Report, lockstep: Option<u32>) -> Result
 /// does the final digest.
 struct PassCheck<'a> {
     expected: &'a [Expected],
+    /// Number of the first one.
+    first: u32,
     /// The pass after the last one compared.
     next: usize,
     samples: u64,
@@ -119,9 +125,10 @@ struct PassCheck<'a> {
 }
 
 impl<'a> PassCheck<'a> {
-    const fn new(expected: &'a [Expected]) -> Self {
+    const fn new(expected: &'a [Expected], first: u32) -> Self {
         Self {
             expected,
+            first,
             next: 0,
             samples: 0,
             first_bad: None,
@@ -144,7 +151,7 @@ impl<'a> PassCheck<'a> {
             samples: pass.samples,
             digest: pass.digest,
         };
-        let number = pass.pass as usize;
+        let number = pass.pass.wrapping_sub(self.first) as usize;
         let agrees = self.expected.get(number) == Some(&here);
         if agrees && number >= self.next {
             self.samples += self.samples_of(self.next..number);
@@ -183,7 +190,7 @@ pub fn run_digests(
 ) -> Result<Compared, RemoteError> {
     start(session, Report::Digests, lockstep.then_some(u32::MAX))?;
     let mut following = Following::new(session, operator)?;
-    let mut passes = PassCheck::new(expected);
+    let mut passes = PassCheck::new(expected, session.first_pass());
     loop {
         match following.event(session)? {
             Event::Pass(pass) => {

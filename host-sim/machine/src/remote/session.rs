@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 
 use protocol::frame::{DELIMITER, Decoder, FRAME_MAX, write_request};
 use protocol::message::{
-    Capabilities, Clock, MotionStatus, Offsets, Profile, Reason, Reply, Request, Status, next_number,
-    read_reply,
+    Capabilities, Clock, Journal, MotionStatus, Offsets, Profile, Reason, Reply, Request, Status,
+    next_number, read_reply,
 };
 use protocol::version::{PROTOCOL_VERSION, VersionMismatch};
 
@@ -118,6 +118,8 @@ pub struct Session {
     tries: u32,
     /// A damaged frame came since the last one.
     is_damaged: bool,
+    /// The pass with which the runs of the loaded job begin.
+    first_pass: u32,
 }
 
 fn name(request: &Request) -> &'static str {
@@ -150,6 +152,9 @@ fn name(request: &Request) -> &'static str {
         Request::Probe { .. } => "the probe move",
         Request::Motion => "the position of the axes",
         Request::Spindle(_) => "spindle and coolant",
+        Request::Pause => "the pause",
+        Request::StartAt { .. } => "the start at a pass",
+        Request::Journal => "the journal",
         Request::Offsets | Request::SetOffsets(_) => "the work offsets",
     }
 }
@@ -177,6 +182,7 @@ impl Session {
             feed: None,
             tries: 0,
             is_damaged: false,
+            first_pass: 0,
         };
         // Terminates a partial frame left by noise or by an earlier host.
         session.stream.write_all(&[DELIMITER])?;
@@ -310,6 +316,30 @@ impl Session {
             }),
             _ => Err(RemoteError::Silent("it did not answer with its work offsets")),
         }
+    }
+
+    /// Requests how far the last run came.
+    ///
+    /// # Errors
+    /// As [`Self::command`].
+    pub fn journal(&mut self) -> Result<Option<Journal>, RemoteError> {
+        match self.ask(&Request::Journal)? {
+            Reply::Journal { journal, .. } => Ok(journal),
+            Reply::Nak { reason, .. } => Err(RemoteError::Refused {
+                request: name(&Request::Journal),
+                reason,
+            }),
+            _ => Err(RemoteError::Silent("it did not answer with its journal")),
+        }
+    }
+
+    /// The pass with which the runs of the loaded job begin.
+    pub(super) const fn set_first_pass(&mut self, pass: u32) {
+        self.first_pass = pass;
+    }
+
+    pub(super) const fn first_pass(&self) -> u32 {
+        self.first_pass
     }
 
     /// The job whose words are sent while it runs, or none.
@@ -630,7 +660,8 @@ fn answered(reply: &Reply) -> Option<u16> {
         | Reply::Status { number, .. }
         | Reply::Profile { number, .. }
         | Reply::Motion { number, .. }
-        | Reply::Offsets { number, .. } => Some(*number),
+        | Reply::Offsets { number, .. }
+        | Reply::Journal { number, .. } => Some(*number),
         Reply::Samples { .. } | Reply::PassDigest { .. } | Reply::Room { .. } | Reply::Halted(_) => None,
     }
 }

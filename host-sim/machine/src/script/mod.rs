@@ -229,7 +229,7 @@ mod tests {
             ("# a\ntock 5: hold\n", 2, "`tock 5` is no tick"),
             ("tick5: hold\n", 1, "`tick5` is no tick"),
             ("tick -5: hold\n", 1, "`-5` is no number"),
-            ("tick 5: pause\n", 1, "`pause` is nothing an operator can do"),
+            ("tick 5: wait\n", 1, "`wait` is nothing an operator can do"),
             ("tick 5: hold on\n", 1, "`hold on` is nothing"),
             ("tick 5: override\n", 1, "`override` is no feed override"),
             ("tick 0: hold\n", 1, "tick 0 begins the run"),
