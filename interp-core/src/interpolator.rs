@@ -365,6 +365,9 @@ impl Motion {
         self.program.seal()?;
         self.state = State::Ready;
         self.restart(store);
+        if let Ok(job) = self.program.job(store) {
+            self.run.prepare_start(&job);
+        }
         Ok(())
     }
 

@@ -196,10 +196,20 @@ impl Run {
             (planning, false) => *planning = PassPlanning::SCAN,
         }
         self.travel = Travel::START;
-        self.buffer.forget();
         self.last_interval = f32::INFINITY;
         self.step_over = None;
         self.next_route = None;
+    }
+
+    /// A job was loaded: collapses the first patch of its first pass, ahead of the tick that begins it. A fault is left for that tick.
+    pub(crate) fn prepare_start(&mut self, job: &Job<'_>) {
+        self.buffer.forget();
+        let is_scanned = matches!(self.planning, PassPlanning::Scan(_));
+        // The rows of a streamed job may not be here yet; with limits the first pass is planned, and prepared on the way to it.
+        if is_scanned && !self.lines.is_in_use() && job.header.window == 0 && job.header.axes.is_none() {
+            let route = self.first_route(job);
+            self.buffer.prepare(job, &route);
+        }
     }
 
     /// The first pass.
