@@ -109,13 +109,14 @@ fn failures(name: &str, start: Start, scallop_mm: f64) -> Vec<String> {
 }
 
 /// The last passes of the cap are parts of a front of 0.2 mm, then the whole boundary: every sample and the scallop height are as exact as elsewhere.
-/// Where its fronts end on the last boundary, plans end up to 0.25 um before or behind it; the jerk of that step is not judged here.
+/// Without a correction of the progress before the end, the last step was up to 0.25 um too long or too short, and the jerk 1.7 of its limit.
 #[test]
 fn short_parts_before_the_boundary_are_exact() {
     for start in [Start::Edge, Start::Middle] {
-        let mut failures = failures("sphere_cap", start, 0.02);
-        failures.retain(|failure| !failure.contains("of its jerk limit"));
-        assert!(failures.is_empty(), "{start:?}: {failures:?}");
+        for scallop_mm in [0.02, 0.05] {
+            let failures = failures("sphere_cap", start, scallop_mm);
+            assert!(failures.is_empty(), "{start:?}, {scallop_mm} mm: {failures:?}");
+        }
     }
 }
 

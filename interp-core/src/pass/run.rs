@@ -526,6 +526,22 @@ impl Run {
         Some(length * mean / (travel.path.inv_speed * self.buffer.patch().per_mm))
     }
 
+    /// Arc to the end of the pass, mm, by Hermite's two-point rule; none before its last piece, and where its end is not evaluated.
+    pub(crate) fn arc_left(&self, job: &Job<'_>) -> Option<f32> {
+        let (travel, patch) = (&self.travel, self.buffer.patch());
+        if !self.is_along() || !patch.has_ends() || travel.route.next(job, &travel.piece).is_some() {
+            return None;
+        }
+        let length = fraction_to_f32(travel.piece.end().checked_sub(travel.fraction)?);
+        let (here, end) = (&travel.path, patch.end());
+        let (first, last) = (1.0 / here.inv_speed, 1.0 / end.inv_speed);
+        let bow = first * here.log_speed_derivative - last * end.log_speed_derivative;
+        let mean = 0.5 * (first + last) + bow * length * (1.0 / 12.0);
+        // Not at a pole, where the speed is 0.
+        let mm = length * mean / patch.per_mm;
+        mm.is_finite().then_some(mm)
+    }
+
     /// Whether the surface faces up at the tool, so that the tool can retract upwards.
     pub(crate) fn faces_up(&self) -> bool {
         self.buffer.patch().faces_up(self.travel.offset)

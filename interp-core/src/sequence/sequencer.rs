@@ -115,6 +115,11 @@ pub(super) enum Planning {
     Complete,
 }
 
+/// Arc before the end of a pass on a front from which on the progress is corrected in each period, units of 2^-10 nm, and the part of the difference that is taken
+/// in a period: a twelfth of 0.15 um takes 3 % of the jerk limit.
+const END_Q10: i64 = 300_000 << 10;
+const END_PARTS: i64 = 12;
+
 /// A correction of the progress: how far the tool is ahead of it, units of 2^-10 nm, and for how many periods that has been known.
 #[derive(Clone, Copy, Debug)]
 struct Correction {
@@ -914,7 +919,7 @@ impl Sequencer {
         command: FeedCommand,
         last: &mut Sample,
     ) -> Result<()> {
-        self.correct_progress(run);
+        self.correct_progress(job, run);
         let (now, _) = both(&mut self.plans, self.second);
         let is_over = if now.point {
             if command.feed_factor > 0.0 && run.is_along() {
@@ -1032,10 +1037,21 @@ impl Sequencer {
 
     /// Corrects the progress at each station by the plan's arc, so that errors do not accumulate from station to station: some periods after it was
     /// measured, because those in which the tool comes to a patch, and the patch after it is prepared, are the worst-case ticks.
-    fn correct_progress(&mut self, run: &Run) {
+    fn correct_progress(&mut self, job: &Job<'_>, run: &Run) {
         let (now, _) = both(&mut self.plans, self.second);
         let kept = now.kept_cells();
         if self.phase != Phase::Pass || now.point {
+            return;
+        }
+        // On a front the stations are far apart near the end, and what is left of their error would be in the last step.
+        let left_q10 = now.plan.length_q10() - self.follower.arc_q10();
+        if now.route.is_on_front()
+            && left_q10 < END_Q10
+            && let Some(left_mm) = run.arc_left(job)
+        {
+            let apart_q10 = left_q10 - crate::feed::to_q10(left_mm);
+            self.correction = None;
+            self.follower.correct(&now.plan, apart_q10 / END_PARTS);
             return;
         }
         if let Some(correction) = &mut self.correction {
