@@ -1039,21 +1039,14 @@ impl Sequencer {
     /// measured, because those in which the tool comes to a patch, and the patch after it is prepared, are the worst-case ticks.
     fn correct_progress(&mut self, job: &Job<'_>, run: &Run) {
         let (now, _) = both(&mut self.plans, self.second);
-        let kept = now.kept_cells();
         if self.phase != Phase::Pass || now.point {
             return;
         }
-        // On a front the stations are far apart near the end, and what is left of their error would be in the last step.
-        let left_q10 = now.plan.length_q10() - self.follower.arc_q10();
-        if now.route.is_on_front()
-            && left_q10 < END_Q10
-            && let Some(left_mm) = run.arc_left(job)
-        {
-            let apart_q10 = left_q10 - crate::feed::to_q10(left_mm);
-            self.correction = None;
-            self.follower.correct(&now.plan, apart_q10 / END_PARTS);
+        if now.route.is_on_front() && self.correct_to_end(job, run) {
             return;
         }
+        let (now, _) = both(&mut self.plans, self.second);
+        let kept = now.kept_cells();
         if let Some(correction) = &mut self.correction {
             if run.prepares_patch() && correction.waited < WAITS_MAX {
                 correction.waited += 1;
@@ -1078,6 +1071,24 @@ impl Sequencer {
             apart_q10: arc_q10 - self.follower.arc_q10(),
             waited: 0,
         });
+    }
+
+    /// Corrects the progress by the arc left, near the end of a pass on a front: the stations are far apart there, and what is left of their error would be in the
+    /// last step. Returns whether it is near.
+    #[inline(never)]
+    fn correct_to_end(&mut self, job: &Job<'_>, run: &Run) -> bool {
+        let (now, _) = both(&mut self.plans, self.second);
+        let left_q10 = now.plan.length_q10() - self.follower.arc_q10();
+        if left_q10 >= END_Q10 {
+            return false;
+        }
+        let Some(left_mm) = run.arc_left(job) else {
+            return false;
+        };
+        let apart_q10 = left_q10 - crate::feed::to_q10(left_mm);
+        self.correction = None;
+        self.follower.correct(&now.plan, apart_q10 / END_PARTS);
+        true
     }
 
     fn follow_hop(
