@@ -83,12 +83,12 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "periods ahead of the tool: LEAD",
     ),
     (
-        "interp_core::feed::newton::Place::factor",
+        "interp_core::feed::newton::rows::Place::factor",
         32,
         "steps of a factor for each of three axes: FACTOR_STEPS",
     ),
     (
-        "interp_core::feed::newton::at_jumps",
+        "interp_core::feed::newton::sweep::at_jumps",
         84,
         "jumps of a pass: KNOTS_MAX",
     ),
@@ -98,7 +98,7 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "coefficients of the last node",
     ),
     (
-        "interp_core::feed::newton::solve",
+        "interp_core::feed::newton::system::solve",
         162,
         "coefficients of a pace: COEFFICIENTS",
     ),
@@ -416,7 +416,7 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "stations of a pass: STATIONS",
     ),
     (
-        "interp_core::sequence::lookahead::PassPlan::arc_at_piece_q10",
+        "interp_core::sequence::lookahead::pass_plan::PassPlan::arc_at_piece_q10",
         20,
         "words of the pieces: PIECE_WORDS",
     ),

@@ -1,12 +1,16 @@
 //! A plan: the path's stations, a walk along them and the pace of the walk; and a cursor that moves along it.
 
-use super::limits::{AxisMotion, FeedChange, MotionLimits};
+mod cursor;
+mod motion;
+
+use super::limits::{FeedChange, MotionLimits};
 use super::pace::{Course, Use};
-use super::profile::{SlotAt, Span, fastest_around};
-use super::stations::{Derivatives, Stations};
+use super::profile::{SlotAt, Span};
+use super::stations::Stations;
 use super::{MM_PER_Q10, Q10_BITS, Q10_PER_MM, to_q10};
 use crate::math::arith::{sqrt, truncated};
 use crate::math::number::{Bounded, to_f32};
+pub(crate) use cursor::Cursor;
 
 /// Greatest and least number of intervals of a walk, and the least where their planning takes longer than the pass.
 pub(crate) const NODES_MAX: usize = 160;
@@ -19,22 +23,8 @@ pub(crate) const COEFFICIENTS: usize = NODES_MAX + 2;
 /// Jumps of a path that a plan takes into account.
 pub(crate) const KNOTS_MAX: usize = 84;
 
-/// Distance from a jump within which a period may see it, periods.
-const JUMP_REACH: f32 = 1.2;
-
-/// Intervals before a place from which a jump near it is sought, and places that are looked at.
-const KNOT_NEAR: u16 = 2;
-const KNOTS_NEAR: usize = 8;
-const KNOT_BITS: u32 = 7;
-const _: () = assert!(KNOTS_MAX < 1 << KNOT_BITS);
-
-/// Intervals that a step of a cursor may pass, and steps that a period is made of where nodes are closer together than that.
-const INTERVALS_A_STEP: u16 = 4;
 const PARTS_MAX: u8 = 8;
 const INTERVALS_A_PART: f32 = 2.0;
-
-/// Part of an interval by which a cursor is shifted at most.
-const SHIFT_MAX: f32 = 0.05;
 
 /// Coefficients of the pace next to an end at speed: the interval there has the speed of the end.
 pub(crate) const PINNED: u16 = 3;
@@ -282,104 +272,6 @@ impl Plan {
     }
 }
 
-/// A place on a plan.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Cursor {
-    pub(crate) interval: u16,
-    /// Fraction of the interval.
-    pub(crate) x: f32,
-    /// On the plan after the one that is followed.
-    pub(crate) is_next: bool,
-    /// Arc at the start of the interval, units of 2^-10 nm.
-    pub(super) start_q10: i64,
-}
-
-impl Cursor {
-    pub(crate) const START: Self = Self {
-        interval: 0,
-        x: 0.0,
-        is_next: false,
-        start_q10: 0,
-    };
-
-    /// The same place on the plan that is followed, of a place on the one after it.
-    pub(crate) fn come_near(&self) -> Option<Self> {
-        self.is_next.then_some(Self {
-            is_next: false,
-            ..*self
-        })
-    }
-
-    /// At a node, to within rounding of its part of a cell.
-    pub(crate) fn at_node(plan: &Plan, node: u16) -> Self {
-        let [cell, part] = plan.node(node);
-        let start = i64::from(plan.stations.get(cell).arc_nm) << Q10_BITS;
-        let since = plan.stations.cell_mm(cell) * f32::from(part) * (1.0 / 65536.0);
-        Self {
-            interval: node,
-            x: 0.0,
-            is_next: false,
-            start_q10: start + to_q10(since),
-        }
-    }
-
-    /// Arc from the start of the path, units of 2^-10 nm.
-    pub(crate) fn arc_q10(&self, plan: &Plan) -> i64 {
-        self.start_q10 + to_q10(plan.interval(self.interval).arc(self.x))
-    }
-
-    /// Speed of the plan's own pace, mm/s.
-    pub(crate) fn speed(&self, plan: &Plan) -> f32 {
-        self.speed_of(&plan.interval(self.interval), plan)
-    }
-
-    fn speed_of(&self, interval: &Interval, plan: &Plan) -> f32 {
-        let [slope, _, _] = interval.walk_rates(self.x);
-        slope * interval.speed(self.x) * plan.inverse_step
-    }
-
-    /// Square of the speed of the plan's own pace, (mm/s)^2: without a root.
-    pub(crate) fn speed_sqr(&self, plan: &Plan) -> f32 {
-        self.speed_sqr_of(&plan.interval(self.interval), plan)
-    }
-
-    /// The same of a pace that is being planned.
-    pub(crate) fn draft_speed_sqr(&self, plan: &Plan, draft: &[f32]) -> f32 {
-        self.speed_sqr_of(&plan.interval_of(draft, self.interval), plan)
-    }
-
-    fn speed_sqr_of(&self, interval: &Interval, plan: &Plan) -> f32 {
-        let [slope, _, _] = interval.walk_rates(self.x);
-        let [pace, _, _] = interval.pace_rates(self.x);
-        let slope = slope * plan.inverse_step;
-        slope * slope * pace.at_least(0.0)
-    }
-
-    /// Moves by this arc, mm, small against an interval; not where the walk nearly stands, and would have to go far. Returns whether it moved.
-    pub(crate) fn shift(&mut self, mm: f32, plan: &Plan) -> bool {
-        let [slope, _, _] = plan.interval(self.interval).walk_rates(self.x);
-        let by = mm / slope.at_least(1e-9);
-        let is_small = by.abs() < SHIFT_MAX;
-        if is_small {
-            self.x = (self.x + by).at_least(0.0);
-            self.carry(plan);
-        }
-        is_small
-    }
-
-    /// Into the next interval where the fraction is above 1.
-    fn carry(&mut self, plan: &Plan) {
-        for _ in 0..INTERVALS_A_STEP {
-            if self.x < 1.0 || self.interval + 1 >= plan.intervals {
-                break;
-            }
-            self.start_q10 += plan.interval_q10(self.interval);
-            self.x -= 1.0;
-            self.interval += 1;
-        }
-    }
-}
-
 impl Plan {
     /// Whether it goes on in the plan of the next pass.
     pub(crate) fn goes_on(&self) -> bool {
@@ -476,161 +368,6 @@ impl Plan {
         cursor.carry(self);
     }
 
-    /// Use of these limits at this pace; see [`Course::use_at`].
-    fn use_of(
-        &self,
-        pace: &[f32],
-        limits: &MotionLimits,
-        cursor: &Cursor,
-        rates: [f32; 3],
-        around: f32,
-    ) -> Use {
-        let [r, r1, r2] = rates;
-        let here = self.motion_at(pace, limits, cursor, r, around);
-        let v = here.v;
-        let speed = v * r;
-        let mut most = Use {
-            feed: speed / limits.feed,
-            ..Use::NONE
-        };
-        here.each_axis(limits, |axis| {
-            let jerk = |j: f32| {
-                let jerk = (j * r * r + 3.0 * axis.acceleration * r1) * r + axis.slope * v * r2;
-                jerk.abs()
-            };
-            let [j, j_beside] = axis.jerk;
-            let of_pace = jerk(j).at_least(jerk(j_beside));
-            most.add(&Use {
-                feed: 0.0,
-                velocity: (axis.slope * speed).abs() * axis.inverse.velocity,
-                acceleration: (axis.acceleration * r * r + axis.slope * v * r1).abs()
-                    * axis.inverse.acceleration,
-                jerk: of_pace * axis.inverse.jerk + axis.of_jump,
-            });
-        });
-        most
-    }
-
-    /// What the limits leave to the derivatives of the pace; see [`Course::span_at`].
-    fn span_of(&self, limits: &MotionLimits, cursor: &Cursor, slot: &SlotAt, room: &Use) -> Span {
-        let SlotAt {
-            r,
-            first,
-            slot_s,
-            around,
-        } = *slot;
-        let here = self.motion_at(&self.pace, limits, cursor, r, around);
-        // The speed changes over the time around the place.
-        let [j, j_beside] = here.j;
-        let fastest = fastest_around([here.v, here.a, j.abs().at_least(j_beside.abs())], r * around);
-        let mut span = Span::WIDE;
-        here.each_axis(limits, |axis| {
-            let along = axis.slope * fastest;
-            let [jerk, _] = axis.jerk;
-            let later = axis.acceleration + 0.5 * slot_s * r * jerk;
-            span.add_acceleration(
-                [axis.acceleration, later].map(|a| a * r * r * axis.inverse.acceleration),
-                axis.slope * here.v * axis.inverse.acceleration,
-                room.acceleration,
-            );
-            let inverse = axis.inverse.jerk;
-            let by_first = 3.0 * axis.acceleration * r;
-            let [one, other] = axis.jerk;
-            let cube = r * r * r * inverse;
-            let of_first = by_first * first * inverse;
-            span.add_jerk(
-                [one.at_most(other), one.at_least(other)].map(|j| j * cube + of_first),
-                [along * inverse, (along + by_first * slot_s) * inverse],
-                room.jerk - axis.of_jump,
-            );
-        });
-        span
-    }
-
-    /// The motion at a place, and at the pace r the jumps that a time around it sees.
-    #[inline(always)]
-    fn motion_at(
-        &self,
-        pace: &[f32],
-        limits: &MotionLimits,
-        cursor: &Cursor,
-        r: f32,
-        around: f32,
-    ) -> MotionAt {
-        let interval = self.interval_of(pace, cursor.interval);
-        let x = cursor.x.at_most(1.0);
-        let inverse = self.inverse_step;
-        let [s1, s2, s3] = interval.walk_rates(x);
-        let [c, c1, c2] = interval.pace_rates(x);
-        let root = sqrt(c.at_least(0.0)) * inverse;
-        let square = inverse * inverse;
-        let v = s1 * root;
-        let a = (s2 * c + 0.5 * s1 * c1) * square;
-        let j = root * square * (s3 * c + 1.5 * s2 * c1 + 0.5 * s1 * c2);
-        // The jerk steps at a node: where the place stands for some time around it, both sides count.
-        let reach = 2.0 * around * root * r;
-        let beside = if x + reach > 1.0 && cursor.interval + 1 < self.intervals {
-            Some(self.interval_of(pace, cursor.interval + 1))
-        } else if x < reach && cursor.interval > 0 {
-            Some(self.interval_of(pace, cursor.interval - 1))
-        } else {
-            None
-        };
-        let j_beside = beside.map_or(j, |beside| {
-            let [_, _, s3] = beside.walk_rates(0.0);
-            let [_, _, c2] = beside.pace_rates(0.0);
-            root * square * (s3 * c + 1.5 * s2 * c1 + 0.5 * s1 * c2)
-        });
-        let arc_q10 = cursor.start_q10 + to_q10(interval.arc(x));
-        let [from, _] = self.node(cursor.interval);
-        let [to, _] = self.node(cursor.interval + 1);
-        let cell = self.stations.cell_between(from, to, arc_q10);
-        let length = self.stations.cell_mm(cell);
-        let since = self.stations.since(cell, arc_q10);
-        let part = (since / length.at_least(1e-7)).at_least(0.0).at_most(1.0);
-        let q = self.stations.blend(cell, part);
-        let near = (JUMP_REACH * limits.period).at_least(around) * v * r;
-        let jump = if since <= near && cell > 0 && self.stations.is_jump(cell - 1) {
-            Some(cell - 1)
-        } else if length - since <= near && self.stations.is_jump(cell + 1) {
-            Some(cell + 1)
-        } else {
-            None
-        };
-        let mut at_jump = 0.0;
-        let jump = jump.map_or([[0.0; 2]; 3], |station| {
-            at_jump = self.speed_over(pace, station, cursor.interval).unwrap_or(v) * r;
-            limits.jump_jerk(&self.stations.jump(station))
-        });
-        MotionAt {
-            v,
-            a,
-            j: [j, j_beside],
-            at_jump,
-            q,
-            jump,
-        }
-    }
-
-    /// Speed of a pace over a jump that is near an interval, mm/s; none of a jump that does not matter.
-    fn speed_over(&self, pace: &[f32], station: u16, near: u16) -> Option<f32> {
-        let knots = self.knots.get(..usize::from(self.knot_count))?;
-        let from = near.saturating_sub(KNOT_NEAR);
-        let mut first = 0;
-        for bit in (0..KNOT_BITS).rev() {
-            let further = first + (1 << bit);
-            if knots.get(further - 1).is_some_and(|knot| knot.interval < from) {
-                first = further;
-            }
-        }
-        let mut near = knots.get(first..)?.iter().take(KNOTS_NEAR);
-        let knot = near.find(|knot| knot.station == station)?;
-        let x = f32::from(knot.part) * (1.0 / 65536.0);
-        let interval = self.interval_of(pace, knot.interval);
-        let [slope, _, _] = interval.walk_rates(x);
-        Some(slope * interval.speed(x) * self.inverse_step)
-    }
-
     /// Moves on at a pace that is being planned.
     pub(crate) fn advance_draft(&self, draft: &[f32], cursor: &mut Cursor, seconds: f32) {
         self.advance_at(draft, cursor, seconds);
@@ -639,47 +376,6 @@ impl Plan {
     /// Use of these limits at a pace that is being planned.
     pub(crate) fn use_draft(&self, draft: &[f32], limits: &MotionLimits, cursor: &Cursor) -> Use {
         self.use_of(draft, limits, cursor, [1.0, 0.0, 0.0], 0.0)
-    }
-}
-
-/// The motion of a plan at a place.
-struct MotionAt {
-    /// mm/s, mm/s^2; jerk on either side of a node nearby, mm/s^3.
-    v: f32,
-    a: f32,
-    j: [f32; 2],
-    /// Speed at the pace over a jump nearby, mm/s.
-    at_jump: f32,
-    q: Derivatives,
-    jump: [[f32; 2]; 3],
-}
-
-/// The motion of an axis at a place.
-struct AxisAt<'a> {
-    slope: f32,
-    /// mm/s^2, and mm/s^3 on either side of a node nearby.
-    acceleration: f32,
-    jerk: [f32; 2],
-    /// Jerk of a jump nearby, as a fraction of the limit.
-    of_jump: f32,
-    inverse: &'a AxisMotion,
-}
-
-impl MotionAt {
-    /// Calls `each` with each axis.
-    #[inline(always)]
-    fn each_axis(&self, limits: &MotionLimits, mut each: impl FnMut(&AxisAt)) {
-        let Self { v, a, at_jump, .. } = *self;
-        for ((inverse, [q1, q2, q3]), [first, second]) in limits.inverse.iter().zip(&self.q).zip(&self.jump) {
-            let bend = (q3 * v * v + 3.0 * q2 * a) * v;
-            each(&AxisAt {
-                slope: *q1,
-                acceleration: q2 * v * v + q1 * a,
-                jerk: self.j.map(|j| bend + q1 * j),
-                of_jump: (first + second * at_jump) * at_jump,
-                inverse,
-            });
-        }
     }
 }
 

@@ -1,0 +1,345 @@
+//! The walk along a path that a plan scales: an acceleration-limited motion below rough caps of the speed, smoothed by a moving average, with nodes
+//! close together where the speed changes.
+
+mod means;
+mod nodes;
+mod speeds;
+
+use super::knots::find_knots;
+use super::limits::MotionLimits;
+use super::lists::Lists;
+use super::plan::Plan;
+use super::stations::Station;
+use crate::math::arith::sqrt;
+use crate::math::number::Bounded;
+use nodes::GROWTH;
+
+/// Spacing of nodes that is fine enough, s; its growth per second away from busy places; the widest, s.
+const SPACING: f32 = 5e-3;
+/// Bisections of the spacing.
+const BISECTIONS: u8 = 12;
+/// Tries to coarsen the ends.
+const COARSENINGS: u8 = 20;
+const STATIONS_A_PORTION: u16 = 24;
+const JUMPS_A_PORTION: u16 = 6;
+const CELLS_A_PORTION: u16 = 84;
+const NODES_A_PORTION: u16 = 60;
+const PLACES_A_PORTION: u16 = 50;
+const KNOTS_A_PORTION: u16 = 40;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Stage {
+    Done,
+    Caps,
+    Jumps,
+    /// The speed of an end that is not a rest is held.
+    Flatten,
+    Backwards,
+    Forwards,
+    /// Inserts the rests at jumps.
+    Rests,
+    Busy,
+    /// Whether even spacing is fine enough.
+    TryEven,
+    /// Whether it is, growing away from busy places.
+    TryGrowing,
+    /// Coarser until the widest spacing fits.
+    Coarsen,
+    Bisect(u8),
+    Times,
+    Increments,
+    Means,
+    Nodes,
+    Knots,
+}
+
+/// What is varied to fit the nodes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Vary {
+    Even,
+    Growth,
+    Coarse,
+}
+
+/// The making of a walk.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Walker {
+    stage: Stage,
+    index: u16,
+    /// Least jerk along the path, mm/s^3; greatest acceleration, mm/s^2; greatest speed, mm/s.
+    jerk: f32,
+    acceleration: f32,
+    speed: f32,
+    /// Duration of the acceleration-limited motion, and length of the mean, s.
+    duration: f32,
+    mean_s: f32,
+    intervals: u16,
+    /// The plan takes no longer than its planning: the fewest steps are to be made.
+    pub(crate) is_short: bool,
+    busy: u16,
+    vary: Vary,
+    low: f32,
+    high: f32,
+    /// Spacing at the ends, s, and its greatest growth.
+    ends: f32,
+    growth: f32,
+    /// Least spacing, s.
+    finest: f32,
+    /// Nodes of the unsmoothed walk, and what their times are scaled by.
+    times: u16,
+    scale: f32,
+    /// Cell, and the place before it: station and mm beyond it.
+    cell: u16,
+    before: (u32, f32),
+    /// Sums over the mean: length, units of 2^-10 nm, and time, s.
+    sum_q10: i64,
+    sum_s: f32,
+    coarsenings: u8,
+    /// Speeds at the ends, mm/s, and nodes of the mean where one is not a rest.
+    speeds: [f32; 2],
+    mean: u16,
+    tightened: f32,
+}
+
+/// Lists of this stage.
+const SPEED_SQR: usize = 0;
+const TIME: usize = 1;
+/// Acceleration, negative where the speed is capped below the feed.
+const ACCEL: usize = 2;
+/// Times of busy places, those of rests with a minus; then the steps between nodes.
+pub(super) const BUSY: usize = 3;
+const NODES: usize = 4;
+
+impl Walker {
+    pub(crate) const IDLE: Self = Self {
+        stage: Stage::Done,
+        index: 0,
+        jerk: 0.0,
+        acceleration: 0.0,
+        speed: 0.0,
+        duration: 0.0,
+        mean_s: 0.0,
+        intervals: 0,
+        is_short: false,
+        busy: 0,
+        vary: Vary::Even,
+        low: 0.0,
+        high: 0.0,
+        ends: 0.0,
+        growth: GROWTH,
+        finest: 0.0,
+        times: 0,
+        scale: 0.0,
+        cell: 0,
+        before: (0, 0.0),
+        sum_q10: 0,
+        sum_s: 0.0,
+        coarsenings: 0,
+        speeds: [0.0; 2],
+        mean: 0,
+        tightened: 1.0,
+    };
+
+    /// `tightened`: share of the acceleration near an end at speed.
+    pub(crate) const fn begin(&mut self, period: f32, tightened: f32) {
+        *self = Self::IDLE;
+        self.tightened = tightened;
+        // Nodes much closer together than periods would not be seen.
+        self.finest = 0.5 * period;
+        self.stage = Stage::Caps;
+        self.jerk = f32::MAX;
+    }
+
+    /// Cycles of the next portion, by the pessimistic model of `cargo sim budget`.
+    pub(crate) const fn cycles(&self) -> u32 {
+        match self.stage {
+            Stage::Caps => 18_100,
+            Stage::Jumps | Stage::Means | Stage::Knots => 10_500,
+            Stage::Rests => 12_000,
+            Stage::Backwards | Stage::Busy => 25_000,
+            Stage::Forwards | Stage::Flatten => 17_000,
+            Stage::TryEven | Stage::TryGrowing | Stage::Coarsen | Stage::Bisect(_) | Stage::Times => 25_500,
+            Stage::Increments => 21_500,
+            Stage::Nodes => 15_000,
+            Stage::Done => 0,
+        }
+    }
+
+    /// One portion; whether the walk is complete. `least`: periods that the plan has to take at least, for the planning so far.
+    #[inline(never)]
+    pub(crate) fn work(
+        &mut self,
+        lists: &mut Lists,
+        plan: &mut Plan,
+        limits: &MotionLimits,
+        least: u32,
+    ) -> bool {
+        let count = plan.stations.count();
+        self.stage = match self.stage {
+            Stage::Caps => {
+                self.speeds = plan.ends;
+                let end = count.min(self.index + STATIONS_A_PORTION);
+                for station in self.index..end {
+                    let Station { arc_nm, q } = plan.stations.get(station);
+                    let share = if plan.is_near_turn(*arc_nm) {
+                        self.tightened
+                    } else {
+                        1.0
+                    };
+                    self.cap(lists, station, q, limits, share);
+                }
+                self.next(end, end == count, Stage::Caps, Stage::Jumps)
+            }
+            Stage::Jumps => {
+                let mut left = JUMPS_A_PORTION;
+                let mut station = self.index;
+                while station < count && left > 0 {
+                    if plan.stations.is_jump(station) {
+                        self.slow_at_jump(lists, plan, station, limits);
+                        left -= 1;
+                    }
+                    station += 1;
+                }
+                let next = if self.is_from_rest_to_rest() {
+                    Stage::Backwards
+                } else {
+                    Stage::Flatten
+                };
+                self.next(station, station >= count, Stage::Jumps, next)
+            }
+            Stage::Flatten => {
+                self.flatten(lists, plan);
+                Stage::Backwards
+            }
+            Stage::Backwards => {
+                self.backwards(lists, plan);
+                Stage::Forwards
+            }
+            Stage::Forwards => {
+                let last = count.saturating_sub(1);
+                let end = last.min(self.index + CELLS_A_PORTION);
+                self.forwards(lists, plan, self.index, end);
+                if end == last {
+                    self.choose_mean(plan);
+                    self.choose_intervals(limits, least);
+                }
+                self.next(end, end == last, Stage::Forwards, Stage::Rests)
+            }
+            Stage::Rests => {
+                self.rest_at_jumps(lists, plan);
+                Stage::Busy
+            }
+            Stage::Busy => {
+                self.find_busy(lists, plan, limits);
+                Stage::TryEven
+            }
+            Stage::TryEven => {
+                if self.fits(lists, SPACING.at_least(self.finest), 0.0) {
+                    self.vary = Vary::Even;
+                    let least = 0.25 * (self.duration + self.mean_s) / f32::from(self.intervals);
+                    let fine = SPACING.at_least(self.finest);
+                    (self.low, self.high) = (least.at_least(self.finest).at_most(fine), fine);
+                    Stage::Bisect(0)
+                } else {
+                    Stage::TryGrowing
+                }
+            }
+            Stage::TryGrowing => {
+                if self.fits(lists, SPACING.at_least(self.finest), self.growth) {
+                    self.vary = Vary::Growth;
+                    (self.low, self.high) = (1e-4, self.growth);
+                    Stage::Bisect(0)
+                } else {
+                    self.vary = Vary::Coarse;
+                    let widest = 8.0 * (self.duration + self.mean_s) / f32::from(self.intervals);
+                    let fine = SPACING.at_least(self.finest);
+                    (self.low, self.high) = (fine, widest.at_least(fine));
+                    Stage::Coarsen
+                }
+            }
+            Stage::Coarsen => {
+                if self.fits(lists, self.high, self.growth) || self.coarsenings >= COARSENINGS {
+                    Stage::Bisect(0)
+                } else {
+                    self.ends *= 1.5;
+                    self.coarsenings += 1;
+                    Stage::Coarsen
+                }
+            }
+            Stage::Bisect(BISECTIONS..) => Stage::Times,
+            Stage::Bisect(tried) => {
+                let middle = sqrt(self.low * self.high);
+                let [spacing, growth] = self.spacing(middle);
+                if self.fits(lists, spacing, growth) {
+                    self.high = middle;
+                } else {
+                    self.low = middle;
+                }
+                Stage::Bisect(tried + 1)
+            }
+            Stage::Times => {
+                self.times(lists, plan);
+                Stage::Increments
+            }
+            Stage::Increments => {
+                let end = self.times.min(self.index + PLACES_A_PORTION);
+                for node in self.index..end {
+                    self.increment(lists, plan, node);
+                }
+                if end == self.times && self.is_from_rest_to_rest() {
+                    self.begin_means(plan);
+                } else if end == self.times {
+                    self.begin_means_at_speed(lists, plan);
+                }
+                self.next(end, end == self.times, Stage::Increments, Stage::Means)
+            }
+            Stage::Means => {
+                let count = plan.intervals + 2;
+                let end = count.min(self.index + NODES_A_PORTION);
+                for index in self.index..end {
+                    if self.is_from_rest_to_rest() {
+                        self.mean(lists, plan, index);
+                    } else {
+                        self.mean_at_speed(lists, plan, index);
+                    }
+                }
+                if end == count {
+                    (self.cell, self.sum_q10) = (0, 0);
+                    plan.trim_q10 = 0;
+                }
+                self.next(end, end == count, Stage::Means, Stage::Nodes)
+            }
+            Stage::Nodes => {
+                let count = plan.intervals + 1;
+                let end = count.min(self.index + PLACES_A_PORTION);
+                for node in self.index..end {
+                    (self.cell, self.sum_q10) = plan.place_node(node, self.cell, self.sum_q10);
+                }
+                if end == count {
+                    plan.trim(self.sum_q10);
+                    plan.knot_count = 0;
+                }
+                self.next(end, end == count, Stage::Nodes, Stage::Knots)
+            }
+            Stage::Knots => {
+                let end = plan.intervals.min(self.index + KNOTS_A_PORTION);
+                for interval in self.index..end {
+                    find_knots(plan, interval, limits);
+                }
+                self.next(end, end == plan.intervals, Stage::Knots, Stage::Done)
+            }
+            Stage::Done => Stage::Done,
+        };
+        self.stage == Stage::Done
+    }
+
+    const fn next(&mut self, index: u16, is_over: bool, stage: Stage, next: Stage) -> Stage {
+        self.index = if is_over { 0 } else { index };
+        if is_over { next } else { stage }
+    }
+
+    /// Whether the walk is from rest to rest.
+    fn is_from_rest_to_rest(&self) -> bool {
+        self.speeds == [0.0; 2]
+    }
+}

@@ -1,0 +1,348 @@
+//! Stations of a piece: which of them are looked at and kept, their checks, arcs and derivatives.
+
+use super::{CELL_KEPT_MM, Lookahead, PATCHES, PassPlan, Task, check_travel, stations_of};
+use crate::fault::{Fault, FaultKind, Result};
+use crate::feed::stations::{Derivatives, Station, WINDOW};
+use crate::feed::{Q10_BITS, to_q10};
+use crate::job::program::Job;
+use crate::job::{AxisLimits, Spacing, SurfaceKind};
+use crate::math::arith::{fraction_to_f32, sqrt, truncated};
+use crate::math::number::{Bounded, MM_PER_NM, nm_to_mm, to_f32};
+use crate::pass::step_over::{PassMaximum, StepOverEstimator};
+use crate::surface::{Contact, PathSpeed};
+
+/// Least length of a cell, mm: a shorter one has differences of rounded positions.
+pub(super) const CELL_MIN_MM: f32 = 0.15;
+
+/// Length of a cell that derivatives are good to, mm, and fewest cells for them: a patch has its own second derivative.
+pub(super) const CELL_FINE_MM: f32 = 0.25;
+pub(super) const CELLS_FINE: u16 = 4;
+
+/// Most cells that are looked at for one between kept stations.
+pub(super) const LOOKS_MAX: u16 = 32;
+
+/// Cells between kept stations of a patch that are fine as they are.
+const CELLS_MANY: u16 = 8;
+
+/// Change of 1 - r k from patch to patch below which it is rounding of single precision.
+const NO_JUMP: f32 = 4e-6;
+
+/// Relative difference of the two-point and the three-point rule of a cell's arc from which on the latter is taken, and up to which: below is rounding, above
+/// neither is trusted.
+const ARC_NOISE: f32 = 1e-6;
+const ARC_APART: f32 = 1.0 / 16.0;
+
+impl Lookahead {
+    /// Chooses the cells of a patch: those between kept stations by the number of patches and their length, the same for the whole pass; those
+    /// that are looked at by the length of this patch.
+    pub(super) fn choose_cells(&mut self, job: &Job<'_>, out: &mut PassPlan) {
+        let spans = job.header.path_spans.max(1);
+        let whole = |value: f32| u16::try_from(truncated(value)).unwrap_or(u16::MAX);
+        let whole_part = self.piece.end().saturating_sub(self.piece.start());
+        let part = |cells: u16| whole_part.checked_div(u64::from(cells)).unwrap_or(u64::MAX);
+        let length = self.patch_length();
+        if out.cells == 0 {
+            let [start, end] = out.route.ends;
+            let spans = if job.header.edges > 0 {
+                start.span.abs_diff(end.span).saturating_add(1)
+            } else {
+                spans
+            };
+            let fit = stations_of(job)
+                .checked_div(spans)
+                .unwrap_or(1)
+                .saturating_sub(1)
+                .max(1);
+            let mean = if job.header.edges > 0 || job.header.spacing.is_constant() {
+                // The last pass may have been one of a small part of the patch, or short stretches of a front.
+                if spans > 1 {
+                    self.patch_mm.at_least(length)
+                } else {
+                    length
+                }
+            } else if self.patch_mm > 0.0 {
+                self.patch_mm
+            } else {
+                length
+            };
+            out.cells = whole(mean / CELL_KEPT_MM).clamp(1, fit);
+            if spans == 1 {
+                // A place between the rests.
+                out.cells = out.cells.max(2);
+            }
+            out.cell_fraction = u64::MAX.checked_div(u64::from(out.cells)).unwrap_or(u64::MAX);
+            out.group = spans.div_ceil(PATCHES);
+        }
+        let fine = whole(length / CELL_FINE_MM).max(CELLS_FINE);
+        let most = whole(length / CELL_MIN_MM).max(2);
+        self.looks = if out.cells >= CELLS_MANY {
+            1
+        } else {
+            fine.min(most).div_ceil(out.cells.max(1)).clamp(1, LOOKS_MAX)
+        };
+        self.cells = out.cells * self.looks;
+        self.cell_fraction = part(self.cells);
+        out.plan.stations.note_spacing(length / f32::from(self.cells));
+    }
+
+    /// Length of the patch, roughly, mm; 0 where its surface is not evaluated.
+    fn patch_length(&self) -> f32 {
+        let at = |fraction| self.patch.evaluate_on_line(fraction).map(|located| located.cc_nm);
+        let [start, end] = self.piece.range;
+        let middle = start + end.saturating_sub(start).div_ceil(2);
+        let (Ok(start), Ok(middle), Ok(end)) = (at(start), at(middle), at(end)) else {
+            return 0.0;
+        };
+        let apart = |from: &[i32; 3], to: &[i32; 3]| {
+            let mut sum = 0.0;
+            for (from, to) in from.iter().zip(to) {
+                let mm = to_f32(i64::from(*to) - i64::from(*from)) * MM_PER_NM;
+                sum += mm * mm;
+            }
+            sqrt(sum)
+        };
+        apart(&start, &middle) + apart(&middle, &end)
+    }
+
+    /// The derivatives that can be taken after a station.
+    pub(super) fn after_station(
+        &self,
+        job: &Job<'_>,
+        estimator: Option<&StepOverEstimator>,
+        out: &PassPlan,
+    ) -> Task {
+        if out.point || (self.is_on_front() && self.is_short) {
+            return self.estimates(job, estimator, out);
+        }
+        let is_end = self.is_end();
+        let count = self.window.count();
+        let last = count.saturating_sub(1);
+        let middle = WINDOW / 2;
+        // Where the window is full for the first time, also those before its middle; at the patch's end also those behind it.
+        let from = if usize::from(self.station) + 1 == count {
+            0
+        } else {
+            middle
+        };
+        let to = if is_end { last } else { middle };
+        if count < WINDOW && !is_end {
+            return self.estimates(job, estimator, out);
+        }
+        match (u8::try_from(from), u8::try_from(to)) {
+            (Ok(from), Ok(to)) => Task::Derivatives(from, to),
+            _ => self.estimates(job, estimator, out),
+        }
+    }
+
+    /// Stores the derivatives at a place of the window, if its station is kept or belongs to a group.
+    pub(super) fn differentiate(&mut self, at: u8, out: &mut PassPlan) {
+        let behind = self.window.count().saturating_sub(1 + usize::from(at));
+        let station = self.station.saturating_sub(u16::try_from(behind).unwrap_or(0));
+        let looks = self.looks.max(1);
+        let (kept, rest) = (station / looks, station % looks);
+        let stations = &mut out.plan.stations;
+        if out.group > 1 {
+            let q = self.window.derivatives(usize::from(at));
+            let begins = station == 0 && self.patches.is_multiple_of(out.group);
+            for back in [1, 2] {
+                if let Some(place) = stations.back_mut(back) {
+                    widen(&mut place.q, &q, begins || back == 1);
+                }
+            }
+        } else if rest == 0 {
+            let back = self.station / looks - kept + 1;
+            if let Some(place) = stations.back_mut(back) {
+                // The direction at the start of a patch is that at the end of the last, where it is known not to jump.
+                let direction = place.q;
+                place.q = self.window.derivatives(usize::from(at));
+                if station == 0 && self.is_smooth && self.has_derivatives {
+                    for (q, direction) in place.q.iter_mut().zip(&direction) {
+                        q[0] = direction[0];
+                    }
+                }
+                if !self.has_derivatives {
+                    // Those before were too short for derivatives of their own.
+                    self.has_derivatives = true;
+                    let q = place.q;
+                    for before in back..=stations.count() {
+                        if let Some(place) = stations.back_mut(before) {
+                            place.q = q;
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// Evaluations of the step-over estimator at a station.
+    pub(super) fn estimates(
+        &self,
+        job: &Job<'_>,
+        estimator: Option<&StepOverEstimator>,
+        out: &PassPlan,
+    ) -> Task {
+        let first = self.station == 0;
+        let begins = first && self.patches == 0;
+        let ends = self.is_end() && out.route.next(job, &self.piece).is_none();
+        let estimator = estimator.filter(|_| job.header.spacing == Spacing::Exact);
+        Task::Estimate(estimator.map_or(0, |estimator| estimator.evaluations(first, begins, ends)))
+    }
+
+    /// Evaluates the station: fit of the ball, travel, inverse square interval, arc.
+    pub(super) fn visit(
+        &mut self,
+        job: &Job<'_>,
+        axes: &AxisLimits,
+        estimator: Option<&mut StepOverEstimator>,
+        out: &mut PassPlan,
+    ) -> Result<()> {
+        let fraction = self.fraction();
+        let (contact, located) = self.patch.evaluate(fraction)?;
+        check_travel(axes, &located.cl_nm)?;
+        check_height(axes, &located.cl_nm)?;
+        let inv_interval_sq = self.patch.interval.inv_interval_sq(&contact);
+        if inv_interval_sq > self.maximum.inv_interval_sq {
+            self.maximum = PassMaximum {
+                inv_interval_sq,
+                shape: [contact.across, contact.lateral_squared],
+            };
+        }
+        if let Some(estimator) = estimator {
+            estimator.see(job, &self.patch, &contact, fraction);
+        }
+        let side = self.patch.side_at(&self.piece.position, fraction);
+        let is_up = self.patch.faces_up(contact.offset);
+        if (self.patches == 0 && self.station == 0) || out.point {
+            (out.ends, out.faces_up, out.sides) = ([located.cl_nm; 2], [is_up; 2], [side; 2]);
+        }
+        (out.ends[1], out.faces_up[1], out.sides[1]) = (located.cl_nm, is_up, side);
+        if out.point {
+            return Ok(());
+        }
+        let path = self.speed_of(&contact);
+        if self.station > 0 {
+            self.arc_mm += self.cell_length(job, &path);
+        }
+        let twist = if contact.lateral_squared > 0.0 {
+            sqrt((contact.twist_squared / contact.lateral_squared).at_least(0.0))
+        } else {
+            0.0
+        };
+        let across = if self.is_on_front() {
+            contact.across / contact.lateral_squared
+        } else {
+            0.0
+        };
+        let bend = [contact.along, twist, across];
+        if self.station == 0 {
+            let apart = |(from, to): (&f32, &f32)| (to - from).abs() > NO_JUMP;
+            self.is_smooth = self.patches > 0 && !self.bend.iter().zip(&bend).any(apart);
+        }
+        self.bend = bend;
+        self.speed = path;
+        self.window.push(located.cl_nm, self.arc_mm);
+        self.keep(out);
+        Ok(())
+    }
+
+    /// Appends the station to the plan's if it is kept, with the last one's derivatives until its own are taken.
+    fn keep(&self, out: &mut PassPlan) {
+        let arc_q10 = self.start_q10 + to_q10(self.arc_mm);
+        let stations = &mut out.plan.stations;
+        let arc_nm = u32::try_from((arc_q10 + (1 << (Q10_BITS - 1))) >> Q10_BITS).unwrap_or(u32::MAX);
+        let q = stations.back_mut(1).map_or([[0.0; 3]; 3], |last| last.q);
+        let begins = self.station == 0 && self.patches.is_multiple_of(out.group);
+        if out.group > 1 {
+            if begins {
+                let station = Station {
+                    arc_nm,
+                    q: [[0.0; 3]; 3],
+                };
+                stations.push(station);
+                stations.push(station);
+            } else if let Some(last) = stations.back_mut(1) {
+                last.arc_nm = arc_nm;
+            }
+        } else if self.station.is_multiple_of(self.looks) {
+            stations.push(Station { arc_nm, q });
+        }
+    }
+
+    /// Arc from the last station, mm: Hermite's two-point rule.
+    pub(super) fn cell_length(&self, job: &Job<'_>, path: &PathSpeed) -> f32 {
+        let [start, end] = self.range;
+        let length = fraction_to_f32(end.saturating_sub(start)) / f32::from(self.cells);
+        let (first, last) = (1.0 / self.speed.inv_speed, 1.0 / path.inv_speed);
+        let bow = first * self.speed.log_speed_derivative - last * path.log_speed_derivative;
+        let two = 0.5 * (first + last) + bow * length * (1.0 / 12.0);
+        let units = if job.header.kind == SurfaceKind::Rational {
+            length * self.three_point(path, two, length)
+        } else {
+            length * two
+        };
+        if self.is_on_front() {
+            units
+        } else {
+            units / self.patch.per_mm
+        }
+    }
+
+    /// Mean speed of a cell of a rational patch, by Hermite's three-point rule where the two-point one is not enough. The reciprocal of the speed of an arc is a
+    /// polynomial, so the middle follows from the ends: half of a quarter arc within 5e-6 of its radius, where two points leave 8e-4.
+    fn three_point(&self, path: &PathSpeed, two: f32, length: f32) -> f32 {
+        let (from, to) = (self.speed.inv_speed, path.inv_speed);
+        let bow = to * path.log_speed_derivative - from * self.speed.log_speed_derivative;
+        let inverse = 0.5 * (from + to) + bow * length * (1.0 / 8.0);
+        let (first, last) = (1.0 / from, 1.0 / to);
+        let rise = first * self.speed.log_speed_derivative - last * path.log_speed_derivative;
+        let three = (first + last) * (7.0 / 30.0) + rise * length * (1.0 / 60.0) + 16.0 / 30.0 / inverse;
+        // A NaN is rejected too.
+        if (three - two).abs() > ARC_NOISE * two && (three - two).abs() < ARC_APART * two {
+            three
+        } else {
+            two
+        }
+    }
+
+    /// The parametrisation at a station; on a front, where the next station may be on another patch, per mm.
+    fn speed_of(&self, contact: &Contact) -> PathSpeed {
+        let PathSpeed {
+            inv_speed,
+            log_speed_derivative,
+        } = contact.path;
+        PathSpeed {
+            inv_speed: if self.is_on_front() {
+                inv_speed * self.patch.per_mm
+            } else {
+                inv_speed
+            },
+            log_speed_derivative,
+        }
+    }
+}
+
+/// The direction at the station, and of each higher derivative the one that is greater.
+fn widen(most: &mut Derivatives, q: &Derivatives, is_here: bool) {
+    for ([direction, bends @ ..], [first, higher @ ..]) in most.iter_mut().zip(q) {
+        if is_here {
+            *direction = *first;
+        }
+        for (most, q) in bends.iter_mut().zip(higher) {
+            if q.abs() > most.abs() {
+                *most = *q;
+            }
+        }
+    }
+}
+
+/// # Errors
+/// [`FaultKind::LinkBlocked`] with the distance above the safe height, mm.
+pub(super) fn check_height(axes: &AxisLimits, [_, _, z]: &[i32; 3]) -> Result<()> {
+    if *z > axes.safe_z_nm {
+        return Err(Fault::new(
+            FaultKind::LinkBlocked,
+            nm_to_mm(z.saturating_sub(axes.safe_z_nm)),
+        ));
+    }
+    Ok(())
+}
