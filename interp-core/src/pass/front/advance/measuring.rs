@@ -1,0 +1,150 @@
+//! The crests between the current front and the next one, measured in each interval and at the ends.
+
+use core::ops::DerefMut;
+
+use super::{Advance, CHUNK, Task};
+use crate::job::program::Job;
+use crate::math::arith::{to_f32, truncated};
+use crate::pass::front::crest::{CURRENT, NEXT, Place, Tools};
+use crate::pass::front::side::UNIT;
+use crate::pass::front::spline::Cubic;
+use crate::pass::front::table::{Column, Table};
+
+/// Share of the limit to which the crests of a straight front are measured; by how much more than the excess a front is lowered.
+const LEVEL_MARGIN: f32 = 0.9999;
+const LOWER: f32 = 1.1;
+/// Places in each interval at which crests are measured, and the bend of a front over an interval above which all of them are, as a share of the step there.
+const PLACES: u16 = 3;
+const BENT: f32 = 0.1;
+/// Scallop height to which the crests are measured, as a share of the limit.
+const MEASURED_MARGIN: f32 = 0.990;
+
+impl Advance {
+    /// Places at which crests are measured: three in each interval, its middle first, then both ends.
+    pub(super) fn crest_place(&self, number: u16) -> Place {
+        let intervals = self.stations.count().saturating_sub(1);
+        let station = number / PLACES;
+        if station < intervals {
+            let at = match number % PLACES {
+                0 => 1 << 30,
+                1 => 1 << 29,
+                _ => 3 << 29,
+            };
+            (station, at)
+        } else if number == PLACES * intervals {
+            (0, 0)
+        } else {
+            (intervals.saturating_sub(1), i32::MAX)
+        }
+    }
+
+    /// The station whose mark stands for a place.
+    fn mark_of(&self, number: u16) -> u16 {
+        let intervals = self.stations.count().saturating_sub(1);
+        let station = number / PLACES;
+        if station < intervals {
+            station
+        } else if number == PLACES * intervals {
+            0
+        } else {
+            intervals.saturating_sub(1)
+        }
+    }
+
+    /// Whether the front is bent so much in an interval that its middle alone does not tell the crest.
+    fn is_bent<W: DerefMut<Target = [i32]>>(&self, job: &Job<'_>, table: &Table<W>, station: u16) -> bool {
+        let length = self.stations.length(job, station);
+        let bend = Cubic::of(table, NEXT, station, length)
+            .point(1 << 30, length)
+            .bend;
+        let [front, next] =
+            [CURRENT, NEXT].map(|columns| Cubic::of(table, columns, station, length).value(1 << 30));
+        let step = to_f32(next.saturating_sub(front)) * UNIT;
+        !(bend.abs() * length * length <= BENT * step)
+    }
+
+    /// Whether the crest is to be measured at a place.
+    fn has_crest<W: DerefMut<Target = [i32]>>(&self, job: &Job<'_>, table: &Table<W>, number: u16) -> bool {
+        let places = PLACES * self.stations.count().saturating_sub(1);
+        let station = self.mark_of(number);
+        let bit = if number < places { 1 } else { 2 };
+        let is_middle = number.is_multiple_of(PLACES) || number >= places;
+        if table.word(Column::Mark, station) & bit == 0 {
+            return false;
+        }
+        let [low, high] = [station, station.saturating_add(1)].map(|at| table.word(Column::Front, at));
+        let is_before = |front: i32| front < self.direction.end;
+        (is_before(low) || is_before(high)) && (is_middle || self.is_bent(job, table, station))
+    }
+
+    /// Passes over places at which no crest is to be measured. Whether it came to one where it is.
+    pub(super) fn finds_crest<W: DerefMut<Target = [i32]>>(
+        &mut self,
+        job: &Job<'_>,
+        table: &mut Table<W>,
+    ) -> bool {
+        for _ in 0..CHUNK {
+            if self.search.next > 0 || self.has_crest(job, table, self.station) {
+                return true;
+            }
+            self.end_crest(table);
+            if self.task != Task::Crest {
+                break;
+            }
+        }
+        false
+    }
+
+    pub(super) fn measure_crest<W: DerefMut<Target = [i32]>>(&mut self, job: &Job<'_>, table: &mut Table<W>) {
+        let margin = if self.is_level {
+            LEVEL_MARGIN
+        } else {
+            MEASURED_MARGIN
+        };
+        let mut tools = Tools {
+            patch: &mut self.patch,
+            job,
+            cursor: &mut self.cursor,
+            direction: &self.direction,
+        };
+        let Some(excess) = self.search.work(&mut tools, table, margin) else {
+            return;
+        };
+        self.note_excess(table, self.mark_of(self.station), excess);
+        self.end_crest(table);
+    }
+
+    /// Goes on to the next place.
+    fn end_crest<W: DerefMut<Target = [i32]>>(&mut self, table: &mut Table<W>) {
+        let places = PLACES * self.stations.count().saturating_sub(1);
+        let number = self.station;
+        let station = self.mark_of(number);
+        let bit = if number < places { 1 } else { 2 };
+        if number >= places || (number + 1).is_multiple_of(PLACES) {
+            let mark = table.word(Column::Mark, station);
+            table.set_word(Column::Mark, station, mark & !bit);
+        }
+        self.next_station(places + 2);
+        if self.task == Task::Crest {
+            let place = self.crest_place(self.station);
+            self.search.begin(place);
+        }
+    }
+
+    /// Notes that the front is too far at an interval.
+    pub(super) fn note_excess<W: DerefMut<Target = [i32]>>(
+        &mut self,
+        table: &mut Table<W>,
+        station: u16,
+        excess: i32,
+    ) {
+        if excess > 0 {
+            self.is_lowered = true;
+            let lower = truncated(LOWER * to_f32(excess)).max(1);
+            for at in [station, station + 1] {
+                let most = table.word(Column::Scratch, at).max(lower);
+                table.set_word(Column::Scratch, at, most);
+            }
+        }
+    }
+}

@@ -1,0 +1,228 @@
+//! The step at each station and in the middle of each interval.
+
+use core::ops::DerefMut;
+
+use super::{Advance, CHUNK, SLOPE_MAX, Task};
+use crate::job::program::Job;
+use crate::job::stations::Stations;
+use crate::math::arith::sqrt;
+use crate::math::number::{Bounded, MM_PER_NM, to_f32 as wide_to_f32};
+use crate::pass::front::crest::{CURRENT, Place, Tools};
+use crate::pass::front::foot::Found;
+use crate::pass::front::frame::{Frame, MARGIN};
+use crate::pass::front::side::WHOLE;
+use crate::pass::front::spline::Cubic;
+use crate::pass::front::table::{Column, Table, UNMEASURED};
+use crate::sample::SpanParameter;
+
+/// Points on the first line and on the last one by which the pass's length is measured.
+const LENGTH_POINTS: u16 = 9;
+/// Shortest interval between stations, in periods at the feed and in step-overs.
+const INTERVAL_PERIODS: f32 = 2.0;
+const INTERVAL_STEPS: f32 = 0.5;
+/// Greatest turn of a pass in one period, rad.
+const TURN_PER_PERIOD: f32 = 0.05;
+/// Least radius of a pass in the tangent plane, in step-overs.
+const RADIUS_STEPS: f32 = 1.0;
+/// Tangent of the greatest angle of a pass to the lines of the side parameter: 80 degrees.
+const TANGENT_MAX: f32 = 5.671_282;
+/// Step where the surface is faulty, units of the fronts.
+const FAULTY_STEP: i32 = WHOLE / 256;
+/// Stations beside those before the boundary up to which a front is stepped: the spline through them forgets what lies farther away.
+const REACH: u16 = 8;
+/// Squares of the derivatives' lengths, side to path, below which an end of the passes is a pole.
+const POLE_MAX: f32 = 1e-10;
+
+impl Advance {
+    /// Measures the length of the first and of the last line, then chooses the stations.
+    pub(super) fn measure_length(&mut self, job: &Job<'_>) {
+        let spans = job.header.path_spans;
+        let number = self.station % LENGTH_POINTS;
+        let at = u64::from(number) * u64::from(spans) * (1 << 32) / u64::from(LENGTH_POINTS - 1);
+        let span = u16::try_from(at >> 32).unwrap_or(0);
+        let path = if span >= spans {
+            SpanParameter {
+                span: spans.saturating_sub(1),
+                fraction: u64::MAX,
+            }
+        } else {
+            SpanParameter {
+                span,
+                fraction: at << 32,
+            }
+        };
+        let distance = if self.station < LENGTH_POINTS {
+            0
+        } else {
+            self.direction.end
+        };
+        let frame = Frame::at(
+            &mut self.patch,
+            job,
+            &mut self.cursor,
+            &self.direction,
+            path,
+            distance,
+        );
+        let point = frame.ok().map(|frame| frame.point);
+        if number == 0 {
+            self.advanced = self.advanced.at_least(self.length_mm);
+            self.length_mm = 0.0;
+        } else if let (Some(from), Some(to)) = (self.before, point) {
+            self.length_mm += distance_mm(&from, &to);
+        }
+        self.before = point;
+        self.station += 1;
+        if self.station == 2 * LENGTH_POINTS {
+            let longest = self.length_mm.at_least(self.advanced);
+            let header = job.header;
+            let step = sqrt(8.0 * header.ball_radius_mm * header.scallop_mm);
+            let period = header.feed_mm_s * header.period_s;
+            let interval = (INTERVAL_PERIODS * period).at_least(INTERVAL_STEPS * step);
+            self.stations = Stations::for_intervals(spans, longest / interval);
+            self.limiter.turn_per_mm = (TURN_PER_PERIOD / period).at_most(1.0 / (RADIUS_STEPS * step));
+            (self.task, self.station) = (Task::Clear, 0);
+        }
+    }
+
+    /// Passes over places so far beyond the boundary that no pass comes near them: the front there is as far as the limits allow.
+    pub(super) fn pass_over<W: DerefMut<Target = [i32]>>(&mut self, table: &mut Table<W>) {
+        let count = self.stations.count();
+        let begun = self.station;
+        for _ in 0..CHUNK {
+            let station = self.station >> 1;
+            if self.task != Task::Step || self.foot.next > 0 || self.is_near(table, station) {
+                break;
+            }
+            let cap = self.direction.cap();
+            if self.station & 1 == 1 {
+                table.set_word(Column::Middle, station, cap);
+            } else {
+                table.set_word(Column::Next, station, cap);
+                table.set_word(Column::Mark, station, UNMEASURED);
+            }
+            self.next_station(2 * count - 1);
+        }
+        if self.task == Task::Step && self.station != begun {
+            self.foot.begin(self.step_place(self.station));
+        }
+    }
+
+    /// Whether the front is before the boundary at a station near this one.
+    fn is_near<W: DerefMut<Target = [i32]>>(&self, table: &Table<W>, station: u16) -> bool {
+        let last = self.stations.count().saturating_sub(1);
+        let from = station.saturating_sub(REACH);
+        let to = station.saturating_add(REACH + 1).min(last);
+        (from..=to).any(|at| table.word(Column::Front, at) < self.direction.end)
+    }
+
+    /// An evaluation of the step at a station, or in the middle of the interval after it.
+    pub(super) fn step<W: DerefMut<Target = [i32]>>(&mut self, job: &Job<'_>, table: &mut Table<W>) {
+        let count = self.stations.count();
+        let number = self.station;
+        let (station, is_middle) = (number >> 1, number & 1 == 1);
+        let is_end = !is_middle && (station == 0 || station + 1 == count);
+        let mut tools = Tools {
+            patch: &mut self.patch,
+            job,
+            cursor: &mut self.cursor,
+            direction: &self.direction,
+        };
+        let front = match self.foot.work(&mut tools, table, is_end, MARGIN) {
+            Found::More(half) => {
+                if let (Some((frame, slope)), false) = (half, is_middle) {
+                    self.note(table, station, &frame, slope);
+                }
+                return;
+            }
+            Found::Front(front) => front,
+            // The tool reports the fault where it reaches it.
+            Found::Faulty => table.word(Column::Front, station).saturating_add(FAULTY_STEP),
+        };
+        let own = front_at(table, station, is_middle, job);
+        if own < self.direction.end {
+            let step = front.saturating_sub(own);
+            let [least, most] = self.steps;
+            self.steps = [least.min(step), most.max(step)];
+        }
+        if is_middle {
+            table.set_word(Column::Middle, station, front);
+        } else {
+            table.set_word(Column::Next, station, front);
+            table.set_word(Column::Mark, station, UNMEASURED);
+        }
+        self.next_station(2 * count - 1);
+        if self.task == Task::Step {
+            self.foot.begin(self.step_place(self.station));
+        }
+    }
+
+    /// Stations and the middles between them, in turns.
+    fn step_place(&self, number: u16) -> Place {
+        let intervals = self.stations.count().saturating_sub(1);
+        let station = number >> 1;
+        if number & 1 == 1 {
+            (station, 1 << 30)
+        } else if station < intervals {
+            (station, 0)
+        } else {
+            (intervals.saturating_sub(1), i32::MAX)
+        }
+    }
+
+    /// The limits at a station.
+    fn note<W: DerefMut<Target = [i32]>>(
+        &mut self,
+        table: &mut Table<W>,
+        station: u16,
+        frame: &Frame,
+        slope: f32,
+    ) {
+        let speed_squared = frame.speed_squared(slope);
+        let area = frame.area();
+        let is_pole = frame.g <= POLE_MAX * frame.e;
+        let [start, end] = self.poles;
+        if station == 0 {
+            self.poles = [is_pole, end];
+        } else if station + 1 == self.stations.count() {
+            self.poles = [start, is_pole];
+        }
+        table.set_real(Column::Speed, station, sqrt(speed_squared));
+        table.set_real(Column::Turn, station, speed_squared / area);
+        let most = |down: f32| {
+            let room = area + down * frame.f * TANGENT_MAX;
+            if room > 1e-9 {
+                (frame.e * TANGENT_MAX / room).at_most(SLOPE_MAX)
+            } else {
+                SLOPE_MAX
+            }
+        };
+        table.set_real(Column::Rise, station, most(-1.0));
+        table.set_real(Column::Fall, station, most(1.0));
+    }
+}
+
+/// The current front at a station, or in the middle of the interval after it.
+fn front_at<W: DerefMut<Target = [i32]>>(
+    table: &Table<W>,
+    station: u16,
+    is_middle: bool,
+    job: &Job<'_>,
+) -> i32 {
+    if is_middle {
+        let length = table.stations().length(job, station);
+        Cubic::of(table, CURRENT, station, length).value(1 << 30)
+    } else {
+        table.word(Column::Front, station)
+    }
+}
+
+fn distance_mm(from: &[i64; 3], to: &[i64; 3]) -> f32 {
+    const MM_PER_Q30: f32 = MM_PER_NM / 1_073_741_824.0;
+    let mut sum = 0.0;
+    for (from, to) in from.iter().zip(to) {
+        let mm = wide_to_f32(to.wrapping_sub(*from)) * MM_PER_Q30;
+        sum += mm * mm;
+    }
+    sqrt(sum)
+}
