@@ -1,0 +1,133 @@
+//! What the board keeps and puts in force: profile, offsets, settings of the drives.
+
+use interp_core::{
+    fault::{Fault, FaultKind},
+    steps::{StepConfig, StepConfigError},
+};
+use protocol::message::{Configuration, Excess, Offsets, Profile, ProfileLimit, Reason, StepSettings};
+
+use super::{Session, requests::no_run};
+use crate::{machine::Machine, manual::Setup, safety::Order, storage::StorageError};
+
+impl Session {
+    /// Puts the profile that the board keeps in force: at power-up, and after a change.
+    ///
+    /// # Errors
+    /// A run is under way.
+    pub(crate) fn enforce_profile(&mut self, machine: &mut impl Machine) -> Result<(), Reason> {
+        self.profile = supervise(machine)?;
+        set_up(machine)?;
+        let own = own_steps(machine);
+        self.set_steps(machine, own)
+    }
+
+    /// Keeps another profile, or none.
+    #[inline(never)]
+    pub(super) fn set_profile(
+        &mut self,
+        machine: &mut impl Machine,
+        profile: Option<&Profile>,
+    ) -> Result<(), Reason> {
+        no_run(machine)?;
+        if profile.is_some_and(|profile| !profile.is_valid()) {
+            return Err(Reason::BadProfile);
+        }
+        machine
+            .keep_profile(profile)
+            .map_err(|StorageError| Reason::Storage)?;
+        self.is_outdated = true;
+        self.upload = None;
+        self.enforce_profile(machine)
+    }
+
+    /// Keeps other work offsets. The job loaded was placed by those before.
+    #[inline(never)]
+    pub(super) fn set_offsets(
+        &mut self,
+        machine: &mut impl Machine,
+        offsets: &Offsets,
+    ) -> Result<(), Reason> {
+        no_run(machine)?;
+        machine
+            .keep_offsets(offsets)
+            .map_err(|StorageError| Reason::Storage)?;
+        self.is_outdated = true;
+        self.upload = None;
+        Ok(())
+    }
+
+    pub(super) fn set_steps(&mut self, machine: &mut impl Machine, config: StepConfig) -> Result<(), Reason> {
+        set_steps(machine, config)?;
+        self.steps = Some(config);
+        Ok(())
+    }
+}
+
+/// Puts the supervision of the kept profile in force; returns the profile's digest, 0 where there is none.
+#[inline(never)]
+fn supervise(machine: &mut impl Machine) -> Result<u32, Reason> {
+    let profile = machine.profile();
+    let configuration = profile.map_or(Configuration::DEFAULT, |profile| profile.configuration);
+    machine.order(Order::Configure(configuration))?;
+    Ok(profile.map_or(0, |profile| profile.digest()))
+}
+
+/// Puts what the kept profile says of motion outside a job in force.
+#[inline(never)]
+fn set_up(machine: &mut impl Machine) -> Result<(), Reason> {
+    #[allow(clippy::cast_precision_loss, reason = "a period is below 2^24 us")]
+    let period_s = machine.description().period_us as f32 * 1e-6;
+    let profile = machine.profile();
+    machine.order(Order::SetUp(
+        profile.map(|profile| Setup::new(&profile, period_s)),
+    ))
+}
+
+/// The settings of the drives of a job that has none: the profile's, or the board's own.
+#[inline(never)]
+pub(super) fn own_steps(machine: &mut impl Machine) -> StepConfig {
+    match machine.profile() {
+        Some(profile) => profile.steps.into(),
+        None => machine.own_steps(),
+    }
+}
+
+pub(super) const fn beyond(excess: Excess) -> Reason {
+    Reason::BeyondProfile { excess }
+}
+
+/// Whether these settings differ from the profile's, if the board keeps one.
+pub(super) fn has_other_steps(machine: &mut impl Machine, settings: StepSettings) -> bool {
+    machine.profile().is_some_and(|profile| profile.steps != settings)
+}
+
+/// A job may want a machine to be homed that need not be, but not the other way round.
+pub(super) fn configure(machine: &mut impl Machine, configuration: Configuration) -> Result<(), Reason> {
+    let must_home = machine
+        .profile()
+        .is_some_and(|profile| profile.configuration.homing_required);
+    if must_home && !configuration.homing_required {
+        return Err(beyond(Excess::of(ProfileLimit::Homing)));
+    }
+    machine.order(Order::Configure(configuration))
+}
+
+/// Validated here, outside the tick; applied between two ticks.
+fn set_steps(machine: &mut impl Machine, config: StepConfig) -> Result<(), Reason> {
+    no_run(machine)?;
+    let refused = |value: f32, record| Reason::Job {
+        fault: Fault::new(FaultKind::BadHeader, value).into(),
+        record,
+    };
+    let checked = config.check().map_err(|error| match error {
+        #[allow(clippy::cast_precision_loss, reason = "a value to be read by a person")]
+        StepConfigError::StepsPerMm { axis, steps, mm } => {
+            refused(steps as f32 / mm as f32, Some(axis.into()))
+        }
+        StepConfigError::PulseSlots(slots) => refused(slots.into(), None),
+        StepConfigError::SetupSlots(slots) => refused(slots.into(), None),
+    })?;
+    machine
+        .set_steps(&checked)
+        .map_err(|fault| refused(fault.value, None))
+}
