@@ -189,7 +189,11 @@ fn measure<'a>(
     let mut last_pass = None;
     let mut running = BTreeMap::<u32, PassSamples>::new();
     let mut motion = Motion::default();
-    let mut time = TimeMeter::new(job.machine.period_s(), job.feed_mm_s());
+    let jerk_mm_s3 = job
+        .machine
+        .limits
+        .map(|limits| limits.jerk_mm_s3.into_iter().fold(f64::INFINITY, f64::min));
+    let mut time = TimeMeter::new(job.machine.period_s(), job.feed_mm_s(), jerk_mm_s3);
     progress.begin("measuring", timed.samples);
     let ran = machine(job, prepared)?.run(|sample| {
         axes.borrow_mut().emitted(sample.tick, sample.cl_nm);

@@ -1,7 +1,6 @@
 //! The time of a job: its parts, stands in contact, passes against the optimum within the limits; as text and as JSON.
 
 use serde_json::{Map, Value, json};
-use verify::motion::times::STAND_MAX_S;
 use verify::motion::{JobTimes, OptimumTimes, PassEnd, PassTime};
 
 use super::out::say;
@@ -102,7 +101,7 @@ pub(super) fn print(times: &JobTimes, optimum: &OptimumTimes) {
             "{:.0} ms in contact; {} above {:.0} ms",
             1e3 * times.standing_max_s,
             times.stands.len(),
-            1e3 * STAND_MAX_S
+            1e3 * times.stand_max_s
         ),
     );
     for judged in &optimum.passes {

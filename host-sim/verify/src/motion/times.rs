@@ -13,7 +13,7 @@ const PLACE_NM: i32 = 2;
 /// Share of the programmed feed from which a period counts as at the feed.
 const AT_FEED: f64 = 0.99;
 /// Standing in contact longer than this marks the part, s.
-pub const STAND_MAX_S: f64 = 0.020;
+const STAND_MAX_S: f64 = 0.020;
 /// Stands in contact that are stored.
 const STANDS_MAX: usize = 1000;
 /// A link that comes this near to the highest point of the run, nm, is a retract: the safe height is above the whole surface.
@@ -109,7 +109,9 @@ pub struct JobTimes {
     pub standing_s: f64,
     /// The longest stand in contact, s.
     pub standing_max_s: f64,
-    /// Stands in contact of more than [`STAND_MAX_S`], in the order of ticks; at most 1000.
+    /// Standing in contact longer than this is listed, s: 20 ms, and the time for which a rest between two motions looks like a stand.
+    pub stand_max_s: f64,
+    /// Longer stands in contact, in the order of ticks; at most 1000.
     pub stands: Vec<Stand>,
     /// The links, in order.
     pub links: Vec<LinkTime>,
@@ -150,6 +152,7 @@ struct OpenLink {
 pub struct TimeMeter {
     period_s: f64,
     feed_mm_s: f64,
+    stand_max_s: f64,
     periods: [u64; 3],
     place: Option<Place>,
     stands: Vec<(Stand, Option<usize>)>,
@@ -166,12 +169,17 @@ const RAMP_PART: usize = 1;
 const STANDING_PART: usize = 2;
 
 impl TimeMeter {
-    /// A meter of a run with this period at this programmed feed of the contact.
+    /// A meter of a run with this period at this programmed feed of the contact. `jerk_mm_s3`: the least jerk limit of the axes, if there are any.
     #[must_use]
-    pub fn new(period_s: f64, feed_mm_s: f64) -> Self {
+    pub fn new(period_s: f64, feed_mm_s: f64, jerk_mm_s3: Option<f64>) -> Self {
+        // With jerk J a motion from rest leaves a place of width x after (6 x / J)^(1/3); one more comes to rest before it.
+        let rest_s = jerk_mm_s3.map_or(0.0, |jerk| {
+            2.0 * (6.0 * f64::from(PLACE_NM) * MM_PER_NM / jerk).cbrt()
+        });
         Self {
             period_s,
             feed_mm_s,
+            stand_max_s: STAND_MAX_S + rest_s,
             periods: [0; 3],
             place: None,
             stands: Vec::new(),
@@ -279,7 +287,7 @@ impl TimeMeter {
             centre_mm: millimetres(place.cl_nm),
             place: kind,
         };
-        if time_s > STAND_MAX_S || time_s > self.longest() {
+        if time_s > self.stand_max_s || time_s > self.longest() {
             self.stands
                 .push((stand, place.link.filter(|_| !place.any_on_pass)));
         }
@@ -315,7 +323,8 @@ impl TimeMeter {
         }
         let moving = |turn: bool| -> f64 {
             let of_kind = links.iter().filter(|link| link.turn == turn);
-            of_kind.map(|link| link.time_s - link.standing_s).sum()
+            // An empty sum is -0.0.
+            of_kind.map(|link| link.time_s - link.standing_s).sum::<f64>() + 0.0
         };
         let in_contact = |(_, link): &&(Stand, Option<usize>)| link.is_none_or(|link| links[link].turn);
         let contacts = || self.stands.iter().filter(in_contact).map(|(stand, _)| *stand);
@@ -329,7 +338,10 @@ impl TimeMeter {
             links_s,
             standing_s,
             standing_max_s: contacts().map(|stand| stand.time_s).fold(0.0, f64::max),
-            stands: contacts().filter(|stand| stand.time_s > STAND_MAX_S).collect(),
+            stand_max_s: self.stand_max_s,
+            stands: contacts()
+                .filter(|stand| stand.time_s > self.stand_max_s)
+                .collect(),
             links,
         }
     }
@@ -347,7 +359,7 @@ pub fn warning(times: &JobTimes) -> Option<String> {
     let longest = times.stands.iter().max_by(|a, b| a.time_s.total_cmp(&b.time_s))?;
     Some(format!(
         "the tool stands in contact for more than {:.0} ms in {} places, {:.0} ms at tick {}, pass {} ({})",
-        1e3 * STAND_MAX_S,
+        1e3 * times.stand_max_s,
         times.stands.len(),
         1e3 * longest.time_s,
         longest.tick,
@@ -370,7 +382,7 @@ mod tests {
     impl Run {
         fn new() -> Self {
             Self {
-                meter: TimeMeter::new(1e-3, 10.0),
+                meter: TimeMeter::new(1e-3, 10.0, None),
                 tick: 0,
                 at_nm: [0, 0, 50_000_000],
             }
@@ -477,5 +489,27 @@ mod tests {
             (StandPlace::Pole, 0)
         );
         assert!((times.standing_max_s - 0.063).abs() < 1e-9 && times.links.is_empty());
+    }
+
+    /// With a jerk limit of 2.5 mm/s^3 a rest between two motions keeps the tool within 2 nm for 34 ms: it does not stand there.
+    #[test]
+    fn a_rest_of_a_slow_machine_is_no_stand() {
+        let stands = |periods: u32, jerk_mm_s3: Option<f64>| {
+            let mut run = Run::new();
+            run.meter = TimeMeter::new(1e-3, 10.0, jerk_mm_s3);
+            run.go(100, [10_000, 0, 0], 0, 10.0)
+                .go(periods, [0; 3], 1, 0.0)
+                .go(100, [10_000, 0, 0], 1, 10.0);
+            run.meter.finish().stands.len()
+        };
+        assert_eq!(
+            [
+                stands(40, None),
+                stands(40, Some(10_000.0)),
+                stands(40, Some(2.5)),
+                stands(60, Some(2.5))
+            ],
+            [1, 1, 0, 1]
+        );
     }
 }
