@@ -70,6 +70,13 @@ impl Stations {
         }
     }
 
+    /// Removes the stations behind this number of them.
+    pub(crate) const fn truncate(&mut self, count: u16) {
+        if count < self.count {
+            self.count = count;
+        }
+    }
+
     /// A station by its number from the end of the list, 1 for the last.
     pub(crate) fn back_mut(&mut self, back: u16) -> Option<&mut Station> {
         let index = self.count.checked_sub(back)?;
@@ -179,6 +186,18 @@ impl Window {
 
     pub(crate) const fn count(&self) -> usize {
         self.count
+    }
+
+    /// Arc of one of the positions, mm.
+    pub(crate) fn arc_mm(&self, at: usize) -> f32 {
+        self.points.get(at).map_or(0.0, |(_, arc)| *arc)
+    }
+
+    /// Mean distance of the positions, mm.
+    pub(crate) fn spacing_mm(&self) -> f32 {
+        let last = self.count.saturating_sub(1);
+        let intervals = u8::try_from(last).map_or(1.0, f32::from).at_least(1.0);
+        (self.arc_mm(last) - self.arc_mm(0)) / intervals
     }
 
     /// Appends a position; the oldest is dropped.

@@ -232,7 +232,7 @@ impl FrontLine {
 
 impl Cubic {
     /// Places within the interval at which the cubic has an extremum.
-    fn extrema(&self) -> [Option<i32>; 2] {
+    pub(super) fn extrema(&self) -> [Option<i32>; 2] {
         let [a, b, c] = [3.0 * to_f32(self.third), to_f32(self.second), to_f32(self.first)];
         // a t^2 + 2 b t + c
         let root = b * b - a * c;

@@ -9,7 +9,7 @@ mod stretch;
 mod turn_search;
 
 use crate::fault::{Fault, FaultKind, Result};
-use crate::feed::stations::{STATIONS_MAX, Window};
+use crate::feed::stations::{Derivatives, STATIONS_MAX, Station, Window};
 use crate::feed::turn::{self, Turn, TurnEnd};
 use crate::feed::{MM_PER_Q10, to_q10};
 use crate::job::program::Job;
@@ -95,6 +95,14 @@ pub(crate) struct Lookahead {
     /// The stretch is too short for derivatives of its own; none was long enough so far.
     is_short: bool,
     has_derivatives: bool,
+    /// The surface is smooth where the stretch begins.
+    may_join: bool,
+    /// Stations before the stretch; halvings of its cells, because the path bends; the path turns too far within a cell.
+    begun: u16,
+    halvings: u8,
+    is_coarse: bool,
+    /// Length of a cell that is not halved, mm.
+    cell_mm: f32,
     /// Least length of a stretch of the pass, mm, and length of the last pass.
     least_mm: f32,
     pass_mm: f32,
@@ -114,6 +122,12 @@ pub(crate) struct Lookahead {
     is_smooth: bool,
     speed: PathSpeed,
     window: Window,
+    /// On a front: the inverse limits of acceleration and jerk, and the inverse square and cube of the feed; the place before the window's, if it is not kept; the greatest
+    /// derivatives for which there is no room, for the next station.
+    per_limit: [[f32; 2]; 3],
+    slowest: [f32; 2],
+    before: Option<Station>,
+    missed: Option<Derivatives>,
     /// Arc from the start of the patch, mm, and of the pass to the patch, units of 2^-10 nm.
     arc_mm: f32,
     start_q10: i64,
@@ -140,6 +154,11 @@ impl Lookahead {
         after: None,
         is_short: false,
         has_derivatives: false,
+        may_join: false,
+        begun: 0,
+        halvings: 0,
+        is_coarse: false,
+        cell_mm: stations::CELL_FINE_MM,
         least_mm: STRETCH_MIN_MM,
         pass_mm: 0.0,
         station: 0,
@@ -152,6 +171,10 @@ impl Lookahead {
         is_smooth: false,
         speed: PathSpeed::STILL,
         window: Window::EMPTY,
+        per_limit: [[0.0; 2]; 3],
+        slowest: [0.0; 2],
+        before: None,
+        missed: None,
         arc_mm: 0.0,
         start_q10: 0,
         maximum: PassMaximum::NONE,
@@ -210,6 +233,7 @@ impl Lookahead {
         self.turn = *head;
         self.task = if has_head { Task::Head(0) } else { Task::Patch };
         (self.station, self.patches) = (0, 0);
+        (self.halvings, self.is_coarse) = (0, false);
         self.start_q10 = if has_head { head.half_q10() } else { 0 };
         out.head = if has_head { turn::STATIONS } else { 0 };
         out.head_q10 = self.start_q10;
@@ -256,7 +280,7 @@ impl Lookahead {
                 self.patch.lay(job, &out.route, &self.piece)?;
                 self.range = self.piece.range;
                 if self.is_on_front() {
-                    self.begin_stretch(out)?;
+                    self.begin_stretch(job, axes, out)?;
                     self.task = Task::Extend;
                     return Ok(());
                 }
@@ -386,10 +410,13 @@ impl Lookahead {
     }
 
     /// Advances to the next station, the next patch, or the end.
-    fn next_station(&mut self, job: &Job<'_>, out: &PassPlan) -> Task {
+    fn next_station(&mut self, job: &Job<'_>, out: &mut PassPlan) -> Task {
         if !self.is_end() {
             self.station += 1;
             return Task::Station;
+        }
+        if self.looks_finer(out) {
+            return Task::Patch;
         }
         self.start_q10 += to_q10(self.arc_mm);
         let next = if self.is_on_front() {

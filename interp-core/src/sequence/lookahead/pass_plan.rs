@@ -1,5 +1,6 @@
 //! The plan of one pass: what the look-ahead finds, and the feed that is planned from it.
 
+use super::PATCHES;
 use crate::feed::Q10_BITS;
 use crate::feed::limits::MotionLimits;
 use crate::feed::plan::Plan;
@@ -36,8 +37,9 @@ pub(crate) struct PassPlan {
     pub(crate) faces_up: [bool; 2],
     /// Side parameter at start and end.
     pub(crate) sides: [SpanParameter; 2],
-    /// Of a pass on a front, a bit for each piece with which a stretch begins.
+    /// Of a pass on a front, a bit for each piece with which a stretch begins, and the first station of each stretch.
     pub(super) starts: [u32; PIECE_WORDS],
+    firsts: [u8; PATCHES as usize],
     /// Minimum interval of the pass.
     pub(crate) interval: f32,
     /// The pass after this one, where that is known from the pass alone, and whether a step-over on the surface leads there: along the boundary where both end.
@@ -68,6 +70,7 @@ impl PassPlan {
         faces_up: [false; 2],
         sides: [SpanParameter { span: 0, fraction: 0 }; 2],
         starts: [0; PIECE_WORDS],
+        firsts: [0; PATCHES as usize],
         interval: 0.0,
         next: None,
         steps_over: false,
@@ -118,8 +121,8 @@ impl PassPlan {
         for starts in self.starts.iter().take(word) {
             index += starts.count_ones();
         }
-        let station = u16::try_from(index).ok()?.saturating_mul(self.cells + 1);
-        Some(i64::from(self.plan.stations.get(station).arc_nm) << Q10_BITS)
+        let station = *self.firsts.get(usize::try_from(index).ok()?)?;
+        Some(i64::from(self.plan.stations.get(u16::from(station)).arc_nm) << Q10_BITS)
     }
 
     /// The start of the pass.
@@ -161,6 +164,15 @@ impl PassPlan {
     pub(super) fn note_stretch(&mut self, number: u16) {
         if let Some(starts) = self.starts.get_mut(usize::from(number >> 5)) {
             *starts |= 1 << (number & 31);
+        }
+    }
+
+    /// Notes the first station of a stretch by its number: the next one, or one before that.
+    pub(super) fn note_first(&mut self, stretch: u16, back: u16) {
+        let station = self.plan.stations.count().saturating_sub(back);
+        if let (Some(first), Ok(station)) = (self.firsts.get_mut(usize::from(stretch)), u8::try_from(station))
+        {
+            *first = station;
         }
     }
 }

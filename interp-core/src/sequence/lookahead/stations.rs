@@ -3,7 +3,6 @@
 use super::{CELL_KEPT_MM, Lookahead, PATCHES, PassPlan, Task, check_travel, stations_of};
 use crate::fault::{Fault, FaultKind, Result};
 use crate::feed::stations::{Derivatives, Station, WINDOW};
-use crate::feed::{Q10_BITS, to_q10};
 use crate::job::program::Job;
 use crate::job::{AxisLimits, Spacing, SurfaceKind};
 use crate::math::arith::{fraction_to_f32, sqrt, truncated};
@@ -149,26 +148,39 @@ impl Lookahead {
                     widen(&mut place.q, &q, begins || back == 1);
                 }
             }
+        } else if self.is_on_front() {
+            self.keep_derivatives(station, usize::from(at), out);
         } else if rest == 0 {
+            let q = self.window.derivatives(usize::from(at));
             let back = self.station / looks - kept + 1;
-            if let Some(place) = stations.back_mut(back) {
-                // The direction at the start of a patch is that at the end of the last, where it is known not to jump.
-                let direction = place.q;
-                place.q = self.window.derivatives(usize::from(at));
-                if station == 0 && self.is_smooth && self.has_derivatives {
-                    for (q, direction) in place.q.iter_mut().zip(&direction) {
-                        q[0] = direction[0];
-                    }
-                }
-                if !self.has_derivatives {
-                    // Those before were too short for derivatives of their own.
-                    self.has_derivatives = true;
-                    let q = place.q;
-                    for before in back..=stations.count() {
-                        if let Some(place) = stations.back_mut(before) {
-                            place.q = q;
-                        }
-                    }
+            if station == 0 {
+                self.store_start(back, q, out);
+            } else if let Some(place) = stations.back_mut(back) {
+                place.q = q;
+            }
+        }
+    }
+
+    /// Stores the derivatives at the start of a patch, or of a stretch, in the station so far from the last one.
+    pub(super) fn store_start(&mut self, back: u16, q: Derivatives, out: &mut PassPlan) {
+        let stations = &mut out.plan.stations;
+        let Some(place) = stations.back_mut(back) else {
+            return;
+        };
+        // The direction at the start of a patch is that at the end of the last, where it is known not to jump.
+        let direction = core::mem::replace(&mut place.q, q);
+        if self.is_smooth && self.has_derivatives {
+            for (q, direction) in place.q.iter_mut().zip(&direction) {
+                q[0] = direction[0];
+            }
+        }
+        if !self.has_derivatives {
+            // Those before were too short for derivatives of their own.
+            self.has_derivatives = true;
+            let q = place.q;
+            for before in back..=stations.count() {
+                if let Some(place) = stations.back_mut(before) {
+                    place.q = q;
                 }
             }
         }
@@ -236,7 +248,7 @@ impl Lookahead {
         let bend = [contact.along, twist, across];
         if self.station == 0 {
             let apart = |(from, to): (&f32, &f32)| (to - from).abs() > NO_JUMP;
-            self.is_smooth = self.patches > 0 && !self.bend.iter().zip(&bend).any(apart);
+            self.is_smooth = self.patches > 0 && (self.may_join || !self.bend.iter().zip(&bend).any(apart));
         }
         self.bend = bend;
         self.speed = path;
@@ -247,9 +259,8 @@ impl Lookahead {
 
     /// Appends the station to the plan's if it is kept, with the last one's derivatives until its own are taken.
     fn keep(&self, out: &mut PassPlan) {
-        let arc_q10 = self.start_q10 + to_q10(self.arc_mm);
+        let arc_nm = self.arc_nm(self.arc_mm);
         let stations = &mut out.plan.stations;
-        let arc_nm = u32::try_from((arc_q10 + (1 << (Q10_BITS - 1))) >> Q10_BITS).unwrap_or(u32::MAX);
         let q = stations.back_mut(1).map_or([[0.0; 3]; 3], |last| last.q);
         let begins = self.station == 0 && self.patches.is_multiple_of(out.group);
         if out.group > 1 {
@@ -263,8 +274,17 @@ impl Lookahead {
             } else if let Some(last) = stations.back_mut(1) {
                 last.arc_nm = arc_nm;
             }
-        } else if self.station.is_multiple_of(self.looks) {
+        } else if self.station == 0 || self.is_kept() {
             stations.push(Station { arc_nm, q });
+        }
+    }
+
+    /// Whether the station, not the first of its patch, is kept before its derivatives are known: on a front only where there will be none.
+    const fn is_kept(&self) -> bool {
+        if self.is_on_front() {
+            self.is_short
+        } else {
+            self.station.is_multiple_of(self.looks)
         }
     }
 
@@ -322,7 +342,7 @@ impl Lookahead {
 }
 
 /// The direction at the station, and of each higher derivative the one that is greater.
-fn widen(most: &mut Derivatives, q: &Derivatives, is_here: bool) {
+pub(super) fn widen(most: &mut Derivatives, q: &Derivatives, is_here: bool) {
     for ([direction, bends @ ..], [first, higher @ ..]) in most.iter_mut().zip(q) {
         if is_here {
             *direction = *first;

@@ -1,17 +1,40 @@
 //! Stretches of a pass on a front: pieces of one path span, together long enough for differences.
 
+use super::stations::widen;
 use super::stations::{CELL_FINE_MM, CELL_MIN_MM, CELLS_FINE, LOOKS_MAX};
-use super::{CELL_KEPT_MM, Lookahead, PATCHES, PassPlan, STATIONS, STRETCH_MIN_MM, Task};
+use super::{Lookahead, PATCHES, PassPlan, STATIONS, STRETCH_MIN_MM, Task};
 use crate::fault::Result;
-use crate::feed::stations::Window;
+use crate::feed::limits::{AxisMotion, MotionLimits};
+use crate::feed::stations::{Derivatives, Station, Window};
+use crate::feed::{Q10_BITS, to_q10};
+use crate::job::AxisLimits;
 use crate::job::program::Job;
-use crate::math::arith::{fraction_to_f32, truncated};
+use crate::math::arith::{fraction_to_f32, power_of_two, sqrt, truncated};
 use crate::math::number::{Bounded, MM_PER_NM, to_f32};
 use crate::pass::route::Piece;
 use crate::surface::PathSpeed;
 
 const STRETCH_KNOT_MM: f32 = 0.3;
 const STRETCH_SHORT_MM: f32 = 0.2;
+
+/// Change of a second and of a third derivative of an axis from which on a station within a stretch is kept, as shares of what takes the axis to its limit. Error of a third
+/// derivative by rounded positions, times the third power of a cell's length, mm.
+const NOTABLE_SECOND: f32 = 0.08;
+const NOTABLE_THIRD: f32 = 0.15;
+/// Stations kept of those looked at on a piece up to which these shares hold, and by how much more they are at most where there is room for fewer.
+const KEPT_SHARE: f32 = 1.0;
+const LESS_NOTABLE_MAX: f32 = 1.4;
+const THIRD_NOISE: f32 = 60e-6;
+/// Turn within a cell, and its change from one to the next, from which on a stretch is looked at again with shorter cells, rad; how often they are halved.
+const TURN_OF_CELL: f32 = 0.12;
+const CHANGE_OF_CELL: f32 = 0.008;
+const HALVINGS_MAX: u8 = 2;
+/// Share of the jerk limit that the error of a third derivative takes at the feed up to which a cell is not longer, and steps to longer ones.
+const NOISE_SHARE: f32 = 0.05;
+const CELL_STEP: f32 = 1.2;
+const CELL_STEPS: u8 = 4;
+/// Stations that are left for pieces beyond those expected.
+const SPARE: u16 = 6;
 
 /// Most path spans of a pass on a front that are divided into stretches.
 const SPANS_DIVIDED: u16 = 60;
@@ -24,7 +47,12 @@ impl Lookahead {
     }
 
     /// Begins a stretch of a pass on a front.
-    pub(super) fn begin_stretch(&mut self, out: &mut PassPlan) -> Result<()> {
+    pub(super) fn begin_stretch(
+        &mut self,
+        job: &Job<'_>,
+        axes: &AxisLimits,
+        out: &mut PassPlan,
+    ) -> Result<()> {
         let PathSpeed {
             inv_speed,
             log_speed_derivative,
@@ -33,10 +61,21 @@ impl Lookahead {
             inv_speed: inv_speed * self.patch.per_mm,
             log_speed_derivative,
         };
+        if self.halvings > 0 {
+            // The same stretch again.
+            self.stretch = [self.piece; 2];
+            return Ok(());
+        }
+        self.begun = out.plan.stations.count();
+        let [_, before] = self.stretch;
+        // Between stations of a front, not at a knot of the surface.
+        let is_at_knot = before.front.is_none_or(|front| front.is_at_knot());
+        self.may_join = before.position.span == self.piece.position.span && !is_at_knot;
         self.stretch = [self.piece; 2];
         if self.patches > 0 {
             return Ok(());
         }
+        self.may_join = false;
         let [start, end] = out.route.ends;
         let spans = start.span.abs_diff(end.span) + 1;
         let pieces = out.route.front.map_or(1, |front| front.pieces);
@@ -53,16 +92,26 @@ impl Lookahead {
         } else {
             (self.pass_mm / f32::from(room)).at_least(STRETCH_MIN_MM)
         };
-        let expected = pieces.min(PATCHES - 4) + 4;
-        let fit = STATIONS
-            .checked_div(expected)
-            .unwrap_or(1)
-            .saturating_sub(1)
-            .max(1);
-        let kept = u16::try_from(truncated(self.least_mm / CELL_KEPT_MM)).unwrap_or(u16::MAX);
-        out.cells = kept.clamp(1, fit);
-        if out.group > 1 {
-            out.cells = 1;
+        out.cells = 1;
+        let feed = job.header.feed_mm_s;
+        let limits = MotionLimits::new(axes, feed, job.header.period_s);
+        self.per_limit = limits.inverse.map(
+            |AxisMotion {
+                 acceleration, jerk, ..
+             }| [acceleration, jerk],
+        );
+        let inverse = 1.0 / feed;
+        self.slowest = [inverse * inverse, inverse * inverse * inverse];
+        let jerk = limits
+            .axes
+            .iter()
+            .fold(f32::MAX, |least, axis| least.at_most(axis.jerk));
+        self.cell_mm = CELL_FINE_MM;
+        for _ in 0..CELL_STEPS {
+            let noise = THIRD_NOISE * (feed / self.cell_mm) * (feed / self.cell_mm) * (feed / self.cell_mm);
+            if noise > NOISE_SHARE * jerk {
+                self.cell_mm *= CELL_STEP;
+            }
         }
         Ok(())
     }
@@ -81,19 +130,21 @@ impl Lookahead {
         }
         if let Some(front) = first.front.filter(|_| self.patches.is_multiple_of(out.group)) {
             out.note_stretch(front.number);
+            out.note_first(self.patches / out.group.max(1), 0);
         }
         let [start, end] = self.range;
         let length = self.part_mm(end.saturating_sub(start));
         let whole = |value: f32| u16::try_from(truncated(value)).unwrap_or(u16::MAX);
-        let fine = whole(length / CELL_FINE_MM).max(CELLS_FINE);
-        let most = whole(length / CELL_MIN_MM).max(2);
+        let share = power_of_two(-i32::from(self.halvings));
+        let fine = whole(length / (self.cell_mm * share)).max(CELLS_FINE);
+        let most = whole(length / (CELL_MIN_MM * share)).max(2);
         self.is_short = length < STRETCH_SHORT_MM;
         self.looks = if self.is_short {
             1
         } else {
-            fine.min(most).div_ceil(out.cells.max(1)).clamp(1, LOOKS_MAX)
+            fine.min(most).clamp(1, LOOKS_MAX)
         };
-        self.cells = out.cells * self.looks;
+        self.cells = self.looks;
         let part = end.saturating_sub(start).checked_div(u64::from(self.cells));
         self.cell_fraction = part.unwrap_or(u64::MAX);
         if !self.is_short {
@@ -116,18 +167,157 @@ impl Lookahead {
             u64::MAX
         };
         let at_knot = last.front.is_some_and(|front| front.is_at_knot());
-        let least = if at_knot {
+        let least = if at_knot || self.halvings > 0 {
             self.least_mm.at_most(STRETCH_KNOT_MM)
         } else {
             self.least_mm
         };
         // Each span that is left takes a stretch.
         let spans = span.abs_diff(pass_end.span) + 2;
-        let taken = (self.patches + spans).saturating_mul(out.cells + 1);
         self.least_mm < f32::MAX
-            && taken < STATIONS
+            && self.patches + spans < PATCHES
+            && out.plan.stations.count() + 2 * spans < STATIONS
             && self.part_mm(end.saturating_sub(start)) >= least
             && self.part_mm(span_end.saturating_sub(end)) >= STRETCH_KNOT_MM
+    }
+
+    /// Begins the stretch again with cells half as long where the path turns too far within one. Returns whether it does.
+    pub(super) fn looks_finer(&mut self, out: &mut PassPlan) -> bool {
+        let is_coarse = core::mem::take(&mut self.is_coarse);
+        if !is_coarse || self.halvings >= HALVINGS_MAX {
+            self.halvings = 0;
+            return false;
+        }
+        self.halvings += 1;
+        out.plan.stations.truncate(self.begun);
+        let [first, _] = self.stretch;
+        self.piece = first;
+        true
+    }
+
+    /// Stores the derivatives at a place of the window in the station at the stretch's start, or appends a station: at its end, and wherever the derivatives have changed
+    /// notably since the last one. Between stations they are taken for linear.
+    pub(super) fn keep_derivatives(&mut self, station: u16, at: usize, out: &mut PassPlan) {
+        let q = self.window.derivatives(at);
+        let cell = self.window.spacing_mm();
+        for [_, second, third] in &q {
+            self.is_coarse |=
+                second.abs() * cell > TURN_OF_CELL || third.abs() * cell * cell > CHANGE_OF_CELL;
+        }
+        let here = Station {
+            arc_nm: self.arc_nm(self.window.arc_mm(at)),
+            q,
+        };
+        if station == 0 {
+            self.store_start(1, q, out);
+            self.join(out);
+            (self.before, self.missed) = (None, None);
+            return;
+        }
+        let is_end = station == self.cells;
+        let (room, tolerance) = self.room(out);
+        if let Some(last) = out.plan.stations.back_mut(1)
+            && self.is_notable(&last.q, &q, tolerance)
+        {
+            let before = self.before.take();
+            let (wants_before, wants_here) = match &before {
+                Some(before) => (true, self.is_notable(&before.q, &q, tolerance)),
+                None => (false, true),
+            };
+            let wanted = u16::from(wants_before) + u16::from(wants_here && !is_end);
+            if wanted > room {
+                // The greatest on both sides instead.
+                let missed = self.missed.get_or_insert(q);
+                for q in before.iter().map(|before| &before.q).chain([&q]) {
+                    widen(&mut last.q, q, false);
+                    widen(missed, q, false);
+                }
+            } else {
+                if let Some(before) = before {
+                    self.append(before, out);
+                }
+                if wants_here && !is_end {
+                    self.append(here, out);
+                    return;
+                }
+            }
+        }
+        if is_end {
+            self.append(here, out);
+        } else {
+            self.before = Some(here);
+        }
+    }
+
+    /// Leaves out the first station of a stretch where it has the derivatives of the last one's end: the second one is continuous at the stations of a front.
+    fn join(&self, out: &mut PassPlan) {
+        let (_, tolerance) = self.room(out);
+        let stations = &mut out.plan.stations;
+        let Some(start) = stations.back_mut(1).copied() else {
+            return;
+        };
+        if self.may_join
+            && let Some(end) = stations.back_mut(2)
+            && end.arc_nm == start.arc_nm
+            && !self.is_notable(&end.q, &start.q, tolerance)
+        {
+            let count = stations.count();
+            stations.truncate(count.saturating_sub(1));
+            out.note_first(self.patches / out.group.max(1), 1);
+        }
+    }
+
+    fn append(&mut self, mut station: Station, out: &mut PassPlan) {
+        if let Some(missed) = self.missed.take() {
+            widen(&mut station.q, &missed, false);
+        }
+        out.plan.stations.push(station);
+    }
+
+    /// Stations that may be kept besides those at the stretches' ends: one of each piece that is left, two where a knot is crossed.
+    fn room(&self, out: &PassPlan) -> (u16, f32) {
+        let [_, last] = self.stretch;
+        let number = last.front.map_or(0, |front| front.number);
+        let pieces = out.route.front.map_or(0, |front| front.pieces);
+        let [_, end] = out.route.ends;
+        let spans = last.position.span.abs_diff(end.span);
+        let stretches = PATCHES.saturating_sub(self.patches);
+        let left = pieces.saturating_sub(number).min(stretches);
+        let room = STATIONS.saturating_sub(out.plan.stations.count() + left + left / 4 + 2 * spans + SPARE);
+        let per_piece = f32::from(room) / f32::from(left.max(1));
+        (
+            room,
+            (KEPT_SHARE / per_piece).at_least(1.0).at_most(LESS_NOTABLE_MAX),
+        )
+    }
+
+    /// Whether the higher derivatives differ by more than a share of what takes an axis to its limit, at the feed or the lower speed that they allow.
+    fn is_notable(&self, from: &Derivatives, to: &Derivatives, tolerance: f32) -> bool {
+        let cell = self.window.spacing_mm();
+        let noise = THIRD_NOISE / (cell * cell * cell);
+        // Inverse powers of the speed.
+        let [mut square, mut cube] = self.slowest;
+        for q in [from, to] {
+            for ([_, second, third], [acceleration, jerk]) in q.iter().zip(&self.per_limit) {
+                square = square.at_least(second.abs() * acceleration);
+                cube = cube.at_least(third.abs() * jerk);
+            }
+        }
+        cube = cube.at_least(square * sqrt(square));
+        (square, cube) = (square * tolerance, cube * tolerance);
+        let mut is_notable = false;
+        for (([acceleration, jerk], from), to) in self.per_limit.iter().zip(from).zip(to) {
+            let ([_, from2, from3], [_, to2, to3]) = (*from, *to);
+            is_notable |= (to2 - from2).abs() * acceleration > NOTABLE_SECOND * square
+                || ((to3 - from3).abs() - noise) * jerk > NOTABLE_THIRD * cube;
+        }
+        is_notable
+    }
+
+    /// Arc from the start of the pass to an arc of the stretch, nm.
+    pub(super) fn arc_nm(&self, arc_mm: f32) -> u32 {
+        let arc_q10 = self.start_q10 + to_q10(arc_mm);
+        u32::try_from((arc_q10 + (1 << (Q10_BITS - 1))) >> Q10_BITS).unwrap_or(u32::MAX)
     }
 
     /// A pass that is too short for derivatives is straight.

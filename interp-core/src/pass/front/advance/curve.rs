@@ -29,15 +29,29 @@ impl Advance {
             return;
         }
         let length = self.stations.length(job, station);
-        let [low, high] =
-            [CURRENT, NEXT].map(|columns| Cubic::of(table, columns, station, length).value(1 << 30));
+        let [current, next] = [CURRENT, NEXT].map(|columns| Cubic::of(table, columns, station, length));
+        let [low, high] = [&current, &next].map(|cubic| cubic.value(1 << 30));
         let boundary = self.direction.end;
         if low.saturating_add(high) / 2 > boundary.saturating_add(boundary / 20) {
             return;
         }
         let step = table.word(Column::Middle, station).saturating_sub(low);
         let most = low.saturating_add(truncated(MIDDLE_TOLERANCE * to_f32(step)));
-        self.note_excess(table, station, high.saturating_sub(most));
+        let excess = high.saturating_sub(most).max(self.beyond(table, station, &next));
+        self.note_excess(table, station, excess);
+    }
+
+    /// By how much the curve between two stations before the boundary is beyond it: the pass would have corners there.
+    fn beyond<W: DerefMut<Target = [i32]>>(&self, table: &Table<W>, station: u16, curve: &Cubic) -> i32 {
+        let boundary = self.direction.end;
+        let ends = [station, station.saturating_add(1)].map(|at| table.word(Column::Next, at));
+        let mut beyond = 0;
+        if ends.iter().all(|front| *front < boundary) {
+            for at in curve.extrema().into_iter().flatten() {
+                beyond = beyond.max(curve.value(at).saturating_sub(boundary).saturating_add(1));
+            }
+        }
+        beyond
     }
 
     /// Lowers a station by what was measured beside it.
