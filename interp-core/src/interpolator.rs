@@ -31,7 +31,7 @@ pub struct SurfacePoint {
 ///
 /// The job's data lie in a store of 32-bit words, owned (an array) or borrowed (a board's static one, which is then never moved
 /// through the stack). The sample path is not generic over the store: it is compiled once, in this crate.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Interpolator<S = [i32; STORE_WORDS]> {
     motion: Motion,
     store: S,
@@ -295,7 +295,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
 }
 
 /// The machine without its store.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct Motion {
     state: State,
     fault: Option<Fault>,

@@ -1,15 +1,13 @@
 //! One period along a plan. Where the plan is within a fraction of a percent of the programmed feed for long enough, the tool moves at exactly
 //! that feed; the change to it and back is smooth.
 
-use super::limits::{CHANGE_MIN, FeedChange};
+use super::limits::FeedChange;
 use super::pace::Course;
 use super::plan::{Cursor, Lead, Plan, to_mm};
 use crate::math::number::Bounded;
 
 /// Periods at the programmed feed by which the lead may be behind.
 const BEHIND_MAX: f32 = 2.0;
-/// Steps in which a new lead goes ahead.
-const LEAD_STEPS: u16 = 2 * CHANGE_MIN;
 
 impl Lead {
     /// [`Self::look`] at a plan that is being checked, a period after the last look.
@@ -48,8 +46,6 @@ pub(crate) struct Follower {
     /// How far the speed has changed from the plan's to the feed, periods of [`FeedChange`], and whether it changes to it.
     change: u16,
     rises: bool,
-    /// The speed is to be the plan's own.
-    as_planned: bool,
     /// Arc by which the tool has moved more than the lead, mm.
     behind: f32,
     arc_q10: i64,
@@ -61,7 +57,6 @@ impl Follower {
         lead: Lead::NONE,
         change: 0,
         rises: false,
-        as_planned: false,
         behind: 0.0,
         arc_q10: 0,
     };
@@ -115,39 +110,16 @@ impl Follower {
         let whole = plan.change.periods;
         self.change = match self.change {
             0 => {
-                self.rises = self.lead.near >= f32::from(plan.change.lead()) && !self.as_planned;
+                self.rises = self.lead.near >= f32::from(plan.change.lead());
                 u16::from(self.rises)
             }
             change if change >= whole => {
                 self.rises = false;
-                whole.saturating_sub(u16::from(self.lead.near == 0.0 || self.as_planned))
+                whole.saturating_sub(u16::from(self.lead.near == 0.0))
             }
             change if self.rises => change + 1,
             change => change - 1,
         };
-    }
-
-    /// Keeps to the plan's own speed, so that the plan can be replaced, or no longer.
-    pub(crate) const fn keep_to_plan(&mut self, does: bool) {
-        self.as_planned = does;
-    }
-
-    /// Whether the speed is the plan's own.
-    pub(crate) const fn is_as_planned(&self) -> bool {
-        self.change == 0
-    }
-
-    /// The plan has been replaced ahead of the tool: looks ahead anew.
-    pub(crate) fn restart_lead(&mut self, plan: &Plan) {
-        self.lead = Lead {
-            cursor: self.cursor,
-            near: 0.0,
-        };
-        self.behind = 0.0;
-        let step = f32::from(plan.change.lead()) * (1.0 / f32::from(LEAD_STEPS));
-        for _ in 0..LEAD_STEPS {
-            plan.advance(&mut self.lead.cursor, step * plan.limits.period);
-        }
     }
 
     /// Moves tool and lead by this arc, mm, so that the lead stays; the lead once it is worth its time. Returns whether they moved.

@@ -113,11 +113,6 @@ impl MotionLimits {
         }
     }
 
-    /// The same at another feed, mm/s.
-    pub(crate) fn with_feed(&self, feed: f32) -> Self {
-        Self::of(feed, self.axes, self.inverse_chord, self.period)
-    }
-
     /// The same with this share of the jerk.
     pub(crate) fn with_less_jerk(&self, share: f32) -> Self {
         let axes = self.axes.map(|axis| AxisMotion {

@@ -19,11 +19,13 @@
 //! | [`newton`] | the barrier method |
 //! | [`planner`] | all of it in portions, and a check of the result period by period |
 //! | [`follow`] | one period along a plan, at exactly the programmed feed where the plan reaches it |
-//! | [`pace`] | hold, resume, override: checked changes of pace |
+//! | [`pace`] | hold, resume, override: the pace and its changes ([`change`]) |
+//! | [`search`] | the search for a change that is within the limits ([`room`]) |
 //! | [`profile`] | a change of the pace that uses at each place what the axes leave there |
 //! | [`curve`] | rest to rest along a short or straight link in closed form |
 
 mod cell_motion;
+mod change;
 pub(crate) mod curve;
 pub(crate) mod follow;
 mod knots;
@@ -36,6 +38,8 @@ pub(crate) mod plan;
 pub(crate) mod planner;
 pub(crate) mod profile;
 pub(crate) mod road;
+mod room;
+mod search;
 pub(crate) mod stations;
 pub(crate) mod turn;
 mod walk;

@@ -24,7 +24,7 @@ const AFTER_CUT: f32 = 1.5;
 /// The greatest weight in the last steps, and how many those are.
 const BARRIER_AT_END: f32 = 7e-4;
 const STEPS_AT_END: u16 = 2;
-/// Most steps from rest to rest. Otherwise, and for the rest of a path: usual, and few.
+/// Most steps from rest to rest. Otherwise: usual, and few.
 const STEPS_MAX: u8 = 18;
 const STEPS: u8 = 12;
 const STEPS_FEW: u8 = 7;
@@ -51,13 +51,6 @@ const TURN_JERK: f32 = 0.88;
 
 /// Use of the jerk that the check passes: a plan with more is slowed down.
 const JERK_CHECKED: f32 = 0.998;
-
-/// Coefficients that the last node before a changed one sees.
-const SEEN: u16 = 3;
-
-/// Share of its difference from the followed plan that a plan of the rest keeps each time that its check fails, and how often that is done.
-const DRAWN: f32 = 0.6;
-const DRAWN_MAX: u8 = 4;
 
 /// Cycles of the pieces of work in a period's planning, by the pessimistic model of `cargo sim budget`; with the rest of the task 30 000.
 pub(crate) const PORTION_CYCLES: u32 = 26_500;
@@ -110,11 +103,6 @@ pub(crate) struct Planner {
     machine: MotionLimits,
     limits: MotionLimits,
     turn_limits: MotionLimits,
-    /// The first coefficient that is planned: 0, or of the rest of a path that is being followed.
-    first: u16,
-    /// Whether a plan of the rest holds, and how often it was drawn towards the plan that is followed.
-    holds: bool,
-    drawn: u8,
     sweep: Sweep,
     /// Steps of the method so far, and the weight of its barrier.
     step: u8,
@@ -140,9 +128,6 @@ impl Planner {
         machine: MotionLimits::NONE,
         limits: MotionLimits::NONE,
         turn_limits: MotionLimits::NONE,
-        first: 0,
-        holds: false,
-        drawn: 0,
         sweep: Sweep::START,
         step: 0,
         barrier: BARRIER_FIRST,
@@ -162,36 +147,8 @@ impl Planner {
         self.machine = plan.limits;
         self.limits = plan.limits.planned();
         self.turn_limits = self.limits.with_less_jerk(TURN_JERK);
-        self.first = 0;
         self.walker.begin(plan.limits.period, WALK_NEAR_TURN);
         self.stage = Stage::Walk;
-    }
-
-    /// Begins to plan the rest of a path anew, from this coefficient on, at another feed, mm/s.
-    pub(crate) fn begin_rest(&mut self, plan: &mut Plan, first: u16, feed: f32) {
-        self.machine = plan.limits.with_feed(feed);
-        self.limits = self.machine.planned();
-        self.first = first;
-        (self.holds, self.drawn) = (false, 0);
-        for (draft, pace) in draft_mut(&mut self.lists).iter_mut().zip(&plan.pace) {
-            *draft = *pace;
-        }
-        self.begin_method(plan);
-        newton::clear(&mut self.lists);
-        self.stage = Stage::Assemble;
-    }
-
-    /// The plan of the rest, if it holds: the first coefficient that it changes.
-    pub(crate) fn rest(&self) -> Option<u16> {
-        (self.is_done() && self.holds).then_some(self.first)
-    }
-
-    /// Follows the plan of the rest from now on.
-    pub(crate) fn take_over(&mut self, plan: &mut Plan) -> MotionLimits {
-        self.keep(plan);
-        plan.change = FeedChange::new(&self.machine);
-        self.holds = false;
-        self.machine
     }
 
     /// Gives up.
@@ -287,7 +244,7 @@ impl Planner {
             }
             Stage::Solve => {
                 let [start, end] = plan.pinned();
-                newton::solve(&mut self.lists, plan.intervals + 2 - end, self.first.max(start));
+                newton::solve(&mut self.lists, plan.intervals + 2 - end, start);
                 self.reach = Reach::far(plan.pinned() != [0; 2]);
                 Stage::Reach
             }
@@ -302,12 +259,10 @@ impl Planner {
             }
             Stage::Take => self.take(plan, least),
             Stage::Check => {
-                if !self.check(plan) {
-                    Stage::Check
-                } else if self.first > 0 {
-                    self.judge_rest(plan)
-                } else {
+                if self.check(plan) {
                     Stage::Finish
+                } else {
+                    Stage::Check
                 }
             }
             Stage::Finish => {
@@ -333,9 +288,9 @@ impl Planner {
     /// Steps that there is time for. From rest to rest the plan is slowed down to what its planning takes, so one that comes too late makes it slower.
     /// `lasts`: periods of the motion; `least`: those of the planning so far, 0 where they do not matter.
     fn steps_left(&self, plan: &Plan, lasts: f32, least: u32) -> u16 {
-        let most = if self.first == 0 && plan.pinned() == [0; 2] {
+        let most = if plan.pinned() == [0; 2] {
             STEPS_MAX
-        } else if self.first == 0 && self.walker.is_short {
+        } else if self.walker.is_short {
             STEPS_FEW
         } else {
             STEPS
@@ -404,7 +359,7 @@ impl Planner {
         self.weight = 1.0 / sum.at_least(1e-9);
         self.factor = f32::MAX;
         (self.step, self.barrier) = (0, BARRIER_FIRST);
-        self.sweep = Sweep::from(self.first.saturating_sub(SEEN));
+        self.sweep = Sweep::START;
     }
 
     /// Takes the step that was solved for, and begins the next, or the check.
@@ -420,38 +375,11 @@ impl Planner {
     }
 
     fn begin_check(&mut self, plan: &mut Plan) {
-        plan.allow_feed_from(self.first.saturating_sub(SEEN), true);
-        self.cursor = match self.first.checked_sub(SEEN) {
-            Some(node) if node > 0 => Cursor::at_node(plan, node),
-            _ => Cursor::START,
-        };
+        plan.allow_feed();
+        self.cursor = Cursor::START;
         self.most = Use::NONE;
         self.periods = 0;
         self.lead = Lead::NONE;
-    }
-
-    /// Whether the plan of the rest holds; if not, it is drawn towards the plan that is followed, which does.
-    fn judge_rest(&mut self, plan: &mut Plan) -> Stage {
-        let Use {
-            feed,
-            velocity,
-            acceleration,
-            jerk,
-        } = self.most;
-        self.holds = feed <= 1.0 && velocity <= 1.0 && acceleration <= 1.0 && jerk <= JERK_CHECKED;
-        if self.holds {
-            return Stage::Done;
-        }
-        if self.drawn >= DRAWN_MAX {
-            plan.allow_feed_from(self.first.saturating_sub(SEEN), false);
-            return Stage::Done;
-        }
-        self.drawn += 1;
-        for (draft, pace) in draft_mut(&mut self.lists).iter_mut().zip(&plan.pace) {
-            *draft = pace + DRAWN * (*draft - pace);
-        }
-        self.begin_check(plan);
-        Stage::Check
     }
 
     /// One period of the plan; whether it is over.

@@ -17,12 +17,20 @@ const SLOTS_A_STEP: u8 = 8;
 const ROUNDING: f32 = 1e-3;
 /// Difference of r'' from the one that is best, as a share of it, for which a segment goes on.
 const SAME: f32 = 0.08;
-/// How much more that is where there are too many segments.
+/// How much more that is where there are too many segments, and the most: a difference of all of it is none to begin with. So much less is taken than what is best, as
+/// a part of that difference, so that a segment can go on where the axes leave less.
 const COARSER: f32 = 2.5;
+const COARSEST: f32 = 0.6;
+/// The same where half, or three quarters of the segments are taken.
+const COARSE: [f32; 2] = [0.3, 0.6];
+const LESS: f32 = 0.5;
 /// Pace below 0 that is rounding.
 const PACE_MIN: f32 = -1e-5;
 /// Greatest r'', as a multiple of one over the square of a slot.
 const SECOND_MAX: f32 = 4.0;
+/// Share of the r' that the accelerations allow that is aimed at, and the one down to which a segment goes on.
+const AIMED: f32 = 0.985;
+const KEPT: f32 = 0.97;
 /// Greatest r', as a multiple of one over a slot: where the tool hardly moves, speed and acceleration of the plan change much within a slot.
 const FIRST_MAX: f32 = 0.05;
 /// Parts of the best r'' that are tried where it is too much before the goal.
@@ -179,6 +187,16 @@ impl Profile {
     fn last(&self) -> f32 {
         let index = usize::from(self.count).wrapping_sub(1);
         self.second.get(index).copied().unwrap_or(0.0)
+    }
+
+    /// Least difference of r'' for which a segment goes on: greater where few segments are left.
+    const fn least_same(&self) -> f32 {
+        let [half, most] = COARSE;
+        match self.count as usize * 4 / SEGMENTS {
+            0..2 => 0.0,
+            2 => half,
+            _ => most,
+        }
     }
 
     /// Appends a slot; returns whether there is room for it.
@@ -396,7 +414,8 @@ impl Making {
             profile.end_s = end_s;
             return Slot::Complete;
         }
-        let Some(second) = self.choose(&span, [left, first], last, slot_s) else {
+        let same = self.same.at_least(profile.least_same());
+        let Some(second) = self.choose(&span, [left, first], last, [slot_s, same]) else {
             return self.try_again(profile);
         };
         let rates = after(self.rates, sign * second, slot_s);
@@ -406,7 +425,7 @@ impl Making {
             return self.try_again(profile);
         }
         if !profile.push(sign * second) {
-            self.same *= COARSER;
+            self.same = (COARSER * self.same).at_most(COARSEST);
             return self.try_again(profile);
         }
         self.rates = rates;
@@ -414,7 +433,13 @@ impl Making {
     }
 
     /// r'' of a slot, towards the goal; none where nothing is allowed.
-    fn choose(&mut self, span: &Span, [left, first]: [f32; 2], last: f32, slot_s: f32) -> Option<f32> {
+    fn choose(
+        &mut self,
+        span: &Span,
+        [left, first]: [f32; 2],
+        last: f32,
+        [slot_s, same]: [f32; 2],
+    ) -> Option<f32> {
         let most = SECOND_MAX / (slot_s * slot_s);
         let [low, high] = [span.second[0].at_least(-most), span.second[1].at_most(most)];
         if low > high {
@@ -433,7 +458,9 @@ impl Making {
         if self.slots <= self.until {
             fastest = fastest.at_most(self.most);
         }
-        let best = high.at_most((fastest - first) / slot_s).at_least(low);
+        // A little less than the accelerations allow, so that a segment goes on where that changes a little.
+        let aimed = fastest.at_most(AIMED * fastest);
+        let best = high.at_most((aimed - first) / slot_s).at_least(low);
         // What slows the pace down to the goal: what the axes leave here, but the motion of the plan itself matters less at a slower pace.
         let half = (0.5 * (high - low)).at_least(HALF_KEPT * self.half);
         self.half = half;
@@ -443,9 +470,14 @@ impl Making {
             let left = left - moved;
             first <= 0.0 || (left > 0.0 && 0.5 * first * first <= braking * left)
         };
-        let goes_on = (last - best).abs() <= self.same * best.abs()
-            && (low..=high).contains(&last)
-            && first + last * slot_s <= fastest;
+        let reached = first + last * slot_s;
+        let is_same = (last - best).abs() <= same * best.abs() || reached >= KEPT * fastest;
+        let goes_on = is_same && (low..=high).contains(&last) && reached <= fastest;
+        let best = if best > 0.0 {
+            best * (1.0 - LESS * (same - SAME))
+        } else {
+            best
+        };
         let wanted = if goes_on && is_early(last) {
             Some(last)
         } else {

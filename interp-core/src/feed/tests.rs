@@ -372,8 +372,9 @@ fn commanded(
             } else if random.next() < 0.5 {
                 1.0
             } else {
-                random.next()
+                2.0 * random.next()
             };
+            pace.allow_above(if random.next() < 0.8 { 2.0 } else { 1.0 });
             pace.want(wanted as f32, false);
             held = (wanted == 0.0).then_some(now);
         }
@@ -396,6 +397,89 @@ fn commanded(
         assert!(arcs.len() < 500_000, "stalls");
     }
     (holds, uses(path, &arcs, limits), long_jerk(path, &arcs, limits))
+}
+
+/// An override above the plan at a random time of a run: the period of its begin, if there is one, and the periods of the whole run. At no time is the feed
+/// above the commanded one.
+fn overridden(
+    path: &Path,
+    plan: &Plan,
+    limits: &MotionLimits,
+    at: usize,
+    factor: f32,
+) -> (Option<usize>, usize) {
+    let mut follower = Follower::START;
+    follower.begin(plan);
+    let mut pace = Pace::REST;
+    let mut profiles = Profiles::NONE;
+    pace.begin(1.0, T as f32);
+    pace.allow_above(2.0);
+    let (mut arcs, mut begins) = (Vec::new(), None);
+    while !follower.is_over(plan) {
+        pace.want(if arcs.len() >= at { factor } else { 1.0 }, false);
+        let r = pace.tick(&mut profiles);
+        if r > 1.0 && begins.is_none() {
+            begins = Some(arcs.len());
+        }
+        let moved = follower.tick(plan, r);
+        assert!(moved <= limits.feed * factor * T as f32 * 1.00001, "{moved}");
+        arcs.push(follower.arc_q10() as f64 / 1024e6);
+        let mut left = PLACES;
+        while left > 0 && pace.has_work() {
+            left = left.saturating_sub(if pace.begins_search() { 7 } else { 1 });
+            pace.work(plan, &follower.cursor, &mut profiles);
+        }
+    }
+    let most = uses(path, &arcs, limits);
+    let long = long_jerk(path, &arcs, limits);
+    assert!(
+        most[0] <= 1.0001 && most[1] <= 1.0 && most[2] <= 1.05 && long <= 1.02,
+        "{most:?} {long} at {at} by {factor}"
+    );
+    (begins, arcs.len())
+}
+
+/// An override above the plan begins within 20 ms where the plan is limited by the feed, and the run takes not much longer than one that is planned for it.
+#[test]
+fn an_override_above_the_plan_begins_at_once() {
+    let mut random = Random(0x2345_6789_abcd_ef12);
+    // Over the jumps of the last one the axes leave nothing.
+    for (path, feed, is_free) in [
+        (Path::straight(150.0), 30.0, true),
+        (Path::circle(150.0, 20.0), 40.0, true),
+        (Path::straight(3.0), 1.0, true),
+        (Path::slalom(8, 20.0, 50.0), 30.0, true),
+        (Path::slalom(12, 4.0, 5.0), 20.0, false),
+    ] {
+        let limits_now = limits(feed);
+        let plan = path.plan(&limits_now);
+        let whole = run(&plan).len();
+        for factor in [1.1_f32, 1.5, 2.0] {
+            let best = run(&path.plan(&limits(feed * factor))).len();
+            let (mut late, mut none, mut tries) = (0, 0, 0);
+            let mut worst = 0.0_f64;
+            for _ in 0..40 {
+                let at = (random.next() * 0.8 * whole as f64) as usize;
+                let (begins, periods) = overridden(&path, &plan, &limits_now, at, factor);
+                tries += 1;
+                match begins {
+                    Some(period) => late += usize::from(period - at > 20),
+                    None => none += 1,
+                }
+                // The part before the override at the plan's pace, the rest as planned for it.
+                let share = at as f64 / whole as f64;
+                let ideal = at as f64 + (1.0 - share) * best as f64;
+                worst = worst.max((periods as f64 - ideal) / (whole - best) as f64);
+            }
+            std::println!(
+                "{feed} by {factor}: {late} late, {none} not of {tries}; {worst:.2} of the gain lost; {whole} {best}"
+            );
+            assert!(
+                !is_free || (none == 0 && 10 * late <= tries && worst < 0.35),
+                "{feed} by {factor}: {late} {none} {worst}"
+            );
+        }
+    }
 }
 
 /// About as fast as with a rest at each jump; a small jump is passed faster.

@@ -31,7 +31,7 @@ enum LoadStage {
 
 /// State of the job in the store. The caller owns the store and passes it with every call. The surface can be read only
 /// once the job is sealed.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Program {
     stage: LoadStage,
     header: Header,

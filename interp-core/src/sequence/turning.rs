@@ -54,7 +54,12 @@ impl Sequencer {
     pub(super) fn pace_before_turn(&mut self, wanted: f32, next_pace: Option<f32>) -> f32 {
         let (now, next) = self.plans_ref();
         let next_most = next.plan.pace_max + SAME;
-        let wanted = wanted.at_most(now.plan.pace_max);
+        // Faster than planned is possible where the whole pace is.
+        let wanted = if now.plan.pace_max < 1.0 {
+            wanted.at_most(now.plan.pace_max)
+        } else {
+            wanted
+        };
         if !now.turns() {
             return wanted;
         }
@@ -68,7 +73,8 @@ impl Sequencer {
                 .stop_within(gate.duration * greatest / pace.at_least(1e-3));
         }
         match next_pace {
-            Some(next) => wanted.at_most(next),
+            Some(next) if next < 1.0 => wanted.at_most(next),
+            Some(_) => wanted,
             None if is_past => 0.0,
             None => wanted,
         }

@@ -78,11 +78,6 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "halvings of a speed: BISECTIONS",
     ),
     (
-        "interp_core::feed::follow::Follower::restart_lead",
-        64,
-        "periods ahead of the tool: LEAD",
-    ),
-    (
         "interp_core::feed::newton::rows::Place::factor",
         32,
         "steps of a factor for each of three axes: FACTOR_STEPS",
@@ -108,7 +103,7 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "coefficients of a pace: COEFFICIENTS",
     ),
     (
-        "interp_core::feed::pace::Pace::begin_search",
+        "interp_core::feed::pace::Pace::ahead",
         24,
         "steps to the place where a change begins: STEPS_AHEAD",
     ),
@@ -210,11 +205,6 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "coefficients of a pace: COEFFICIENTS",
     ),
     (
-        "interp_core::feed::planner::Planner::judge_rest",
-        162,
-        "coefficients of a pace: COEFFICIENTS",
-    ),
-    (
         "interp_core::feed::planner::Planner::slow",
         162,
         "coefficients of a pace: COEFFICIENTS",
@@ -294,11 +284,6 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "interp_core::feed::knots::find_knots",
         168,
         "stations of an interval, and halvings for each: STATIONS_MAX",
-    ),
-    (
-        "interp_core::sequence::sequencer::Sequencer::plan_for_override",
-        64,
-        "steps of an estimate: AHEAD_STEPS",
     ),
     (
         "interp_core::pass::schedule::apart",

@@ -12,8 +12,6 @@ const JUMP_REACH: f32 = 2.0;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sweep {
     pub(super) node: u16,
-    /// The node to begin at.
-    pub(super) first: u16,
     /// The next jump.
     pub(super) knot: u16,
     /// Inverse square of the speed that the path allows at the node before, (s/mm)^2.
@@ -21,20 +19,16 @@ pub(crate) struct Sweep {
 }
 
 impl Sweep {
-    pub(crate) const START: Self = Self::from(0);
+    /// At the first node.
+    pub(crate) const START: Self = Self {
+        node: 0,
+        knot: 0,
+        speed: 0.0,
+    };
+
     /// The node.
     pub(crate) const fn node(&self) -> u16 {
         self.node
-    }
-
-    /// Over the nodes from this one on.
-    pub(crate) const fn from(first: u16) -> Self {
-        Self {
-            node: first,
-            first,
-            knot: 0,
-            speed: 0.0,
-        }
     }
 
     /// Speed of the walk over a jump near the node, mm/s; none of a jump that does not matter.
@@ -66,7 +60,7 @@ impl Sweep {
         self.node += 1;
         let is_over = self.node > plan.intervals;
         if is_over {
-            *self = Self::from(self.first);
+            *self = Self::START;
         }
         is_over
     }

@@ -248,15 +248,9 @@ impl Plan {
         word >> (interval % 32) & 1 != 0
     }
 
-    /// Whether every interval from this one on allows it, as far as is known.
-    pub(crate) fn allow_feed_from(&mut self, first: u16, does: bool) {
-        let mut left = u32::from(first);
-        for word in &mut self.exact {
-            let before = left.min(32);
-            let kept = u32::MAX.checked_shr(32 - before).unwrap_or(0);
-            *word = (*word & kept) | if does { !kept } else { 0 };
-            left -= before;
-        }
+    /// Every interval allows it, as far as is known.
+    pub(crate) const fn allow_feed(&mut self) {
+        self.exact = [u32::MAX; NODES_MAX / 32];
     }
 
     /// An interval does not allow it.

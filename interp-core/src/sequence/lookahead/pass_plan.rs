@@ -6,7 +6,7 @@ use crate::feed::limits::MotionLimits;
 use crate::feed::plan::Plan;
 use crate::feed::turn::Turn;
 use crate::job::program::Job;
-use crate::math::number::{Bounded, MM_PER_NM, to_f32};
+use crate::math::number::{MM_PER_NM, to_f32};
 use crate::pass::route::Route;
 use crate::sample::SpanParameter;
 use crate::sequence::link::{Along, BoundaryEnd};
@@ -86,9 +86,10 @@ impl PassPlan {
         (self.cells, self.cell_fraction)
     }
 
-    /// The pace at a feed factor, 0 to 1.
+    /// The pace at a feed factor: above 1 where it was planned for less.
     pub(crate) fn pace(&self, feed_factor: f32) -> f32 {
-        (feed_factor * self.full_pace).at_most(1.0)
+        // A plan with a turn may use more than the feed at its own pace.
+        feed_factor * self.full_pace / self.plan.over
     }
 
     /// Sets the limits that it is planned for.

@@ -73,8 +73,6 @@ pub(super) enum Planning {
     Stations,
     /// Its feed is being planned.
     Feed,
-    /// The rest of this pass is being planned anew, for an override above its plan.
-    Rest,
     /// There is no next pass, or it is planned.
     Complete,
 }
@@ -121,13 +119,13 @@ pub(crate) struct Sequencer {
     has_step_over: bool,
     /// Whether the link to the next pass of a job of constant scallop height is to be chosen.
     has_to_choose: bool,
-    /// Periods of planning of the next pass so far, and of making the next front and the one before it.
+    /// Periods of planning of the next pass so far, of this one in all, and of making the next front and the one before it.
     spent: u32,
+    spent_last: u32,
     front_spent: u32,
     front_last: u32,
-    /// Feed factor of the last period, and the feed that the rest of the pass was last planned for, mm/s.
+    /// Feed factor of the last period.
     feed_factor: f32,
-    replanned: f32,
     /// The tool's position, once it is known.
     pub(super) at: Option<[i32; 3]>,
     /// Whether the first patch of the pass ahead is to be collapsed.
@@ -175,10 +173,10 @@ impl Sequencer {
         has_step_over: false,
         has_to_choose: false,
         spent: 0,
+        spent_last: 0,
         front_spent: 0,
         front_last: 0,
         feed_factor: 1.0,
-        replanned: 0.0,
         at: None,
         has_first_patch: false,
         cell: [0; 2],
@@ -218,6 +216,7 @@ impl Sequencer {
         self.lookahead.restart();
         self.feed_factor = 1.0;
         (self.front_spent, self.front_last) = (0, 0);
+        self.spent_last = 0;
         self.has_to_choose = false;
         let (_, next) = both(&mut self.plans, self.second);
         next.route = first;
@@ -299,7 +298,7 @@ impl Sequencer {
 
     /// Whether the next pass is planned.
     pub(super) fn is_planned(&self) -> bool {
-        matches!(self.planning, Planning::Complete | Planning::Rest)
+        self.planning == Planning::Complete
     }
 
     /// One period, into `last`. The phases off the passes are separate functions, so that a tick on a pass saves no registers for them.
@@ -406,6 +405,7 @@ impl Sequencer {
             None if now.is_last => Planning::Complete,
             None => Planning::Awaited(pass),
         };
+        self.spent_last = self.spent;
         if run.arrive_on_front() {
             (self.front_last, self.front_spent) = (self.front_spent, 0);
         }
@@ -499,5 +499,5 @@ impl Sequencer {
 
 /// The greatest pace on a pass at this feed factor.
 fn pace_on(pass: &PassPlan, share: f32) -> f32 {
-    pass.pace(share).at_most(pass.plan.pace_max)
+    pass.pace(share).at_most(1.0).at_most(pass.plan.pace_max)
 }

@@ -58,7 +58,6 @@ impl Sequencer {
         let (now, _) = both(&mut self.plans, self.second);
         self.cell = [0; 2];
         self.correction = None;
-        self.replanned = 0.0;
         if job.header.spacing.is_constant() {
             self.has_to_choose = !now.is_last;
             self.has_hop = false;

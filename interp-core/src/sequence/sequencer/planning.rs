@@ -4,7 +4,6 @@ use super::{Phase, Planning, Sequencer, both};
 use crate::fault::{Fault, FaultKind};
 use crate::feed::MM_PER_Q10;
 use crate::feed::limits::MotionLimits;
-use crate::feed::pace::Course as _;
 use crate::feed::planner::PORTION_CYCLES;
 use crate::feed::turn::Turn;
 use crate::job::program::{Job, Link, Program};
@@ -36,25 +35,23 @@ const HOP_CYCLES: u32 = 24_000;
 const BEGIN_CYCLES: u32 = 1_500;
 const LEG_CYCLES: u32 = 5_000;
 
-/// Cycles of replacing the rest of a plan, or of the wait until that is possible: once a period.
-const TAKE_OVER_CYCLES: u32 = 20_000;
-
 /// Greatest number of pieces of work in a period: the shortest is the step to the next station.
 const PIECES_MAX: u32 = 36;
 
 /// Feed above that of a plan for which it is planned anew, as a ratio.
 const REPLANNED: f32 = 1.001;
 
-/// Periods that planning takes: a node, the rest of a pass apart from its nodes, a whole pass.
+/// Periods that planning takes: a node, a whole pass apart from its nodes.
 const PERIODS_A_NODE: f32 = 3.4;
-const PERIODS_A_REST: f32 = 40.0;
 const PERIODS_A_PASS: f32 = 100.0;
+/// How much longer the planning of a pass may take than that of the last one, as a ratio, and apart from that, periods.
+const LONGER: f32 = 1.2;
+const LONGER_PERIODS: f32 = 30.0;
+/// Periods that the planning of a step-over takes at most.
+const PERIODS_A_STEP_OVER: f32 = 40.0;
 
 /// Share of the time of a rest by which a turn may slow its plan down.
 const REST_SHARE: f32 = 0.3;
-
-/// Steps in which the tool's place after the planning is estimated.
-const AHEAD_STEPS: u16 = 64;
 
 impl Sequencer {
     /// Whether [`Self::plan`] has anything to do.
@@ -67,7 +64,7 @@ impl Sequencer {
             Phase::AwaitGoal(leg) => self.has_to_plan_leg(leg),
             Phase::Await | Phase::Lifted | Phase::Done => false,
         };
-        let wants_more = self.phase == Phase::Pass && self.feed_factor > 1.0;
+        let wants_more = matches!(self.phase, Phase::Pass | Phase::Turn) && self.feed_factor > 1.0;
         is_busy
             || wants_more
             || self.pass_ahead().is_some()
@@ -87,10 +84,7 @@ impl Sequencer {
     fn may_choose(&self) -> bool {
         self.has_to_choose
             && matches!(self.phase, Phase::Pass | Phase::Await)
-            && matches!(
-                self.planning,
-                Planning::Feed | Planning::Rest | Planning::Complete
-            )
+            && matches!(self.planning, Planning::Feed | Planning::Complete)
     }
 
     /// The planning of one period: work of at most [`PORTION_CYCLES`] cycles.
@@ -100,6 +94,12 @@ impl Sequencer {
             return;
         };
         let mut left = PORTION_CYCLES;
+        if matches!(self.phase, Phase::Pass | Phase::Turn) && self.feed_factor > 1.0 {
+            let most = program
+                .job(store)
+                .map_or(1.0, |job| self.pace_in_time(&job, axes, run));
+            self.pace.allow_above(most);
+        }
         match self.planning {
             Planning::Requested(..) | Planning::Stations | Planning::Feed => {
                 self.spent = self.spent.saturating_add(1);
@@ -114,7 +114,7 @@ impl Sequencer {
                     }
                 }
             }
-            Planning::Awaited(_) | Planning::Rest => {}
+            Planning::Awaited(_) => {}
         }
         let mut makes_front = false;
         for _ in 0..PIECES_MAX {
@@ -137,15 +137,54 @@ impl Sequencer {
         self.front_spent = self.front_spent.saturating_add(u32::from(makes_front));
     }
 
-    /// Whether the override asks for more than the plans give.
+    /// Whether the plan of the next pass is to be replaced, because the override asks for more than it gives.
     fn wants_more(&self, job: &Job<'_>) -> bool {
-        if has_turns(job) {
-            return false;
-        }
-        let [one, other] = &self.plans;
+        let (now, next) = self.plans_ref();
         let feed = job.header.feed_mm_s * self.feed_factor;
-        let of = |pass: &PassPlan| feed > REPLANNED * pass.plan.limits.feed;
-        self.phase == Phase::Pass && self.feed_factor > 1.0 && (of(one) || of(other)) && !self.pace.has_work()
+        self.phase == Phase::Pass
+            && !has_turns(job)
+            && !(now.is_last || now.point || next.point)
+            && feed > REPLANNED * next.plan.limits.feed
+            && !self.pace.has_work()
+            && self.periods_left(feed, job.header.period_s)
+                > 1.5 * f32::from(next.plan.intervals) * PERIODS_A_NODE + PERIODS_A_PASS
+    }
+
+    /// Periods to the end of the pass at this feed, mm/s: at least.
+    fn periods_left(&self, feed: f32, period: f32) -> f32 {
+        let (now, _) = self.plans_ref();
+        let left = now.plan.length_q10() - self.follower.cursor.arc_q10(&now.plan);
+        to_f32(left) * MM_PER_Q10 / (feed * period)
+    }
+
+    /// The greatest pace at which the rest of the pass takes as long as what is ahead takes to be planned, where that cannot be waited for above the surface.
+    fn pace_in_time(&self, job: &Job<'_>, axes: &AxisLimits, run: &Run) -> f32 {
+        let (now, _) = self.plans_ref();
+        if now.point || self.pending.is_some() {
+            return 1.0;
+        }
+        if job.header.spacing.is_constant() {
+            let is_ready = self.planning == Planning::Complete && run.front_cycles() == 0;
+            return if is_ready { f32::MAX } else { 1.0 };
+        }
+        let is_on_surface =
+            now.steps_over || now.turns() || job.link_to(now.pass.wrapping_add(1), axes) == Link::Straight;
+        if now.is_last || !is_on_surface {
+            return f32::MAX;
+        }
+        let needed = match self.planning {
+            Planning::Complete if self.has_to_plan_step_over() => PERIODS_A_STEP_OVER,
+            Planning::Complete => return f32::MAX,
+            _ => LONGER * count_to_f32(self.spent_last) + LONGER_PERIODS - count_to_f32(self.spent),
+        };
+        // The last stop before a turn begins before its end.
+        let gate_s = if now.turns() {
+            now.plan.gate.before_end
+        } else {
+            0.0
+        };
+        let period = job.header.period_s;
+        self.periods_left(now.plan.limits.feed, period) / (needed.at_least(1.0) + gate_s / period)
     }
 
     /// Cycles of the next piece of planning, 0 where there is none; and whether it is a portion of the next front.
@@ -164,12 +203,7 @@ impl Sequencer {
 
     /// Cycles of the next piece apart from the next front; none where there is none, or the next front comes first.
     fn next_own_cycles(&self, run: &Run) -> Option<u32> {
-        let [one, other] = &self.plans;
-        let (now, next) = if self.second {
-            (&other.plan, &one.plan)
-        } else {
-            (&one.plan, &other.plan)
-        };
+        let (_, next) = self.plans_ref();
         match self.phase {
             Phase::Pass | Phase::Turn if self.pace.has_work() && self.pace.begins_search() => {
                 return Some(PACE_BEGIN_CYCLES);
@@ -197,9 +231,7 @@ impl Sequencer {
             Planning::Awaited(_) => return None,
             Planning::Requested(..) => BEGIN_CYCLES,
             Planning::Stations => self.lookahead.cycles(run.estimator_ref()),
-            Planning::Feed => self.planner.cycles(next),
-            Planning::Rest if self.planner.is_done() => TAKE_OVER_CYCLES,
-            Planning::Rest => self.planner.cycles(now),
+            Planning::Feed => self.planner.cycles(&next.plan),
             Planning::Complete if self.has_hop => HOP_CYCLES,
             Planning::Complete => return None,
         })
@@ -328,25 +360,6 @@ impl Sequencer {
                     }
                 }
             }
-            Planning::Rest => {
-                if !self.planner.is_done() {
-                    return self.planner.work(&mut now.plan, 0);
-                }
-                // A change of the pace was checked on the plan as it is.
-                let is_ahead = self.planner.rest().is_some_and(|first| {
-                    self.phase == Phase::Pass && self.follower.cursor.interval + 4 < first
-                });
-                if is_ahead && !(self.pace.is_constant() && self.follower.is_as_planned()) {
-                    return;
-                }
-                if is_ahead {
-                    let limits = self.planner.take_over(&mut now.plan);
-                    now.set_limits(job, limits);
-                    self.follower.restart_lead(&now.plan);
-                }
-                self.follower.keep_to_plan(false);
-                self.planning = Planning::Complete;
-            }
             Planning::Complete if self.has_hop => {
                 self.has_hop = false;
                 if let Link::Across(height_nm) = job.link_to(next.pass, axes) {
@@ -371,38 +384,13 @@ impl Sequencer {
         self.swap(run);
     }
 
-    /// Plans what is ahead anew where the override asks for more than the plans give.
+    /// Plans the next pass anew for the override.
     fn plan_for_override(&mut self, job: &Job<'_>, axes: &AxisLimits) {
         let feed = job.header.feed_mm_s * self.feed_factor;
-        let (now, next) = both(&mut self.plans, self.second);
-        if self.phase != Phase::Pass || now.point {
-            return;
-        }
-        let left = to_f32(now.plan.length_q10() - self.follower.cursor.arc_q10(&now.plan)) * MM_PER_Q10;
-        let left_periods = left / (feed * job.header.period_s);
-        if feed > REPLANNED * now.plan.limits.feed && feed > REPLANNED * self.replanned {
-            self.replanned = feed;
-            let mut ahead = self.follower.cursor;
-            let nodes = f32::from(now.plan.intervals - self.follower.cursor.interval);
-            for _ in 0..AHEAD_STEPS {
-                let step = (nodes * PERIODS_A_NODE + PERIODS_A_REST) * (1.0 / f32::from(AHEAD_STEPS));
-                now.plan.advance(&mut ahead, step * job.header.period_s);
-            }
-            let first = ahead.interval + 5;
-            if first + 8 < now.plan.intervals {
-                self.planner.begin_rest(&mut now.plan, first, feed);
-                self.follower.keep_to_plan(true);
-                self.planning = Planning::Rest;
-            }
-        } else if !now.is_last
-            && !next.point
-            && feed > REPLANNED * next.plan.limits.feed
-            && left_periods > 1.5 * f32::from(next.plan.intervals) * PERIODS_A_NODE + PERIODS_A_PASS
-        {
-            next.set_limits(job, MotionLimits::new(axes, feed, job.header.period_s));
-            self.planner.begin(&mut next.plan);
-            self.planning = Planning::Feed;
-        }
+        let (_, next) = both(&mut self.plans, self.second);
+        next.set_limits(job, MotionLimits::new(axes, feed, job.header.period_s));
+        self.planner.begin(&mut next.plan);
+        self.planning = Planning::Feed;
     }
 
     /// Has the pass after the one that is followed next planned, if there is one.
