@@ -1,19 +1,11 @@
 //! Feed within the axis limits, links, and operator commands, on the core itself.
 
-use integration_tests::{dome, scaled_dome};
+use integration_tests::{dome, motion::Uses, scaled_dome};
 use interp_core::{
-    AxisLimits, Command, FaultKind, Header, Inputs, Interpolator, Pattern, Sample, Spacing, SpanParameter,
-    State,
+    AxisLimits, Command, FaultKind, Header, Inputs, Interpolator, Pattern, Sample, SpanParameter, State,
 };
 use machine::prepare::prepare;
-use proptest::prelude::*;
-use std::collections::VecDeque;
 use std::sync::OnceLock;
-
-/// Largest permitted use of the limits of velocity, acceleration and jerk, after the rounding of the positions to nm is subtracted.
-const MORE: [f64; 3] = [1.001, 1.0, 1.02];
-/// Rounding of a quotient.
-const ROUNDING: f64 = 1e-12;
 
 fn axes(safe_z_nm: i32) -> AxisLimits {
     AxisLimits {
@@ -46,55 +38,6 @@ fn period(core: &mut Interpolator, inputs: impl Into<Inputs>) -> Sample {
     core.tick(inputs);
     core.plan();
     *core.last()
-}
-
-/// Periods over which differences are taken for the jerk: over one, a jerk of 10 000 mm/s^3 is 10 nm, as much as positions that are good to a
-/// nanometre or two can make of nothing.
-const BASE: usize = 4;
-
-/// Differences of the emitted positions over the limits, in every state.
-#[derive(Default)]
-struct Use {
-    /// The last positions, the newest first.
-    last: VecDeque<[i64; 3]>,
-    worst: [f64; 3],
-}
-
-impl Use {
-    fn add(&mut self, sample: &Sample, axes: &AxisLimits) {
-        self.last.push_front(sample.cl_nm.map(i64::from));
-        self.last.truncate(3 * BASE + 1);
-        let limits = [axes.velocity_mm_s, axes.acceleration_mm_s2, axes.jerk_mm_s3];
-        for (order, (worst, limits)) in self.worst.iter_mut().zip(limits).enumerate() {
-            let base = if order == 2 { BASE } else { 1 };
-            let weights: &[i64] = [&[1, -1][..], &[1, -2, 1], &[1, -3, 3, -1]][order];
-            for (axis, limit) in limits.into_iter().enumerate() {
-                // Before the first sample the tool stood there.
-                let at = |back: usize| self.last.get(back).or(self.last.back()).unwrap()[axis];
-                let nm: i64 = weights
-                    .iter()
-                    .enumerate()
-                    .map(|(index, weight)| weight * at(index * base))
-                    .sum();
-                // Each position has a rounding error of at most half a nanometre.
-                let rounding = f64::from(1 << order);
-                let period_s = base as f64 * 1e-3;
-                #[allow(clippy::cast_precision_loss, reason = "far below 2^53")]
-                let value = (nm.abs() as f64 - rounding).max(0.0) * 1e-6 / period_s.powi(order as i32 + 1);
-                *worst = worst.max(value / f64::from(limit));
-            }
-        }
-    }
-
-    fn check(&self, what: &str) {
-        for (worst, most) in self.worst.iter().zip(MORE) {
-            assert!(
-                *worst <= most * (1.0 + ROUNDING),
-                "{what}: velocity, acceleration, jerk {:?} of their limits",
-                self.worst
-            );
-        }
-    }
 }
 
 /// Side parameters of the passes.
@@ -158,11 +101,11 @@ fn check_sample_job(name: &str, times: f32, pattern: Pattern, machine_of: fn(i32
     header.axes = Some(machine_of(top + 5_000_000));
     let axes = header.axes.as_ref().unwrap();
     let mut core = machine(&header, &prepared.words);
-    let mut used = Use::default();
+    let mut used = Uses::default();
     let mut sample = period(&mut core, Command::Start);
     let mut last_pass = 0;
     while sample.state.is_under_way() {
-        used.add(&sample, axes);
+        used.add(&sample, axes, 1e-3);
         last_pass = sample.pass;
         sample = period(&mut core, Inputs::default());
     }
@@ -288,29 +231,15 @@ fn scripted(header: &Header, words: &[i32], commands: &[Step]) -> (Vec<Sample>, 
     (samples, core)
 }
 
-fn command(wait_max: u32) -> impl Strategy<Value = Step> {
-    let request = prop_oneof![
-        3 => Just(None),
-        4 => Just(Some(Command::Hold)),
-        4 => Just(Some(Command::Resume)),
-        1 => Just(Some(Command::Start)),
-        1 => Just(Some(Command::Stop)),
-        1 => Just(Some(Command::Abort)),
-    ];
-    let wait = prop_oneof![0_u32..4, 0_u32..60, 0..wait_max];
-    let percent = prop_oneof![Just(100_u8), Just(0), Just(200), 0_u8..=200];
-    (wait, request, percent)
-}
-
 /// Checks that a run with these commands keeps the limits, stays on its path, does not move while held, and has the passes of a run without
 /// commands.
 fn check_commands(header: &Header, words: &[i32], whole: &[SpanParameter], commands: &[Step]) {
     let (samples, core) = scripted(header, words, commands);
     let axes = header.axes.as_ref().unwrap();
-    let mut used = Use::default();
+    let mut used = Uses::default();
     let mut before: Option<Sample> = None;
     for sample in &samples {
-        used.add(sample, axes);
+        used.add(sample, axes, 1e-3);
         if let Some(before) =
             before.filter(|before| before.state == State::Held && sample.state == State::Held)
         {
@@ -361,40 +290,6 @@ fn undisturbed_once(small: bool, zigzag: bool) -> &'static Undisturbed {
     &all[usize::from(small)][usize::from(zigzag)]
 }
 
-/// Commands, and the job that they are for; one job in eight is large. The waits are a part of the job's duration.
-fn sequence(commands_max: usize) -> impl Strategy<Value = (&'static Undisturbed, Vec<Step>)> {
-    (prop_oneof![1 => Just(false), 7 => Just(true)], any::<bool>()).prop_flat_map(move |(small, zigzag)| {
-        let pause_max = if small { 400 } else { 3000 };
-        let commands = proptest::collection::vec(command(pause_max), 0..commands_max);
-        (Just(undisturbed_once(small, zigzag)), commands)
-    })
-}
-
-/// Runs `SEQUENCES` sequences; the default takes a minute, a million takes half an hour on two cores.
-#[test]
-#[ignore = "a minute or more; run it after a change of the feed, with SEQUENCES=1000000 for the whole"]
-fn no_sequence_of_commands_breaks_a_limit_long() {
-    let sequences = std::env::var("SEQUENCES").map_or(40_000_u32, |count| count.parse().unwrap());
-    let threads = std::thread::available_parallelism().map_or(1, |count| u32::try_from(count.get()).unwrap());
-    std::thread::scope(|scope| {
-        for _ in 0..threads {
-            scope.spawn(|| {
-                let config = ProptestConfig {
-                    cases: sequences.div_ceil(threads),
-                    failure_persistence: None,
-                    ..ProptestConfig::default()
-                };
-                proptest::test_runner::TestRunner::new(config)
-                    .run(&sequence(30), |((header, words, whole), commands)| {
-                        check_commands(header, words, whole, &commands);
-                        Ok(())
-                    })
-                    .unwrap();
-            });
-        }
-    });
-}
-
 /// A leg resumed just before its end, where a small acceleration follows a large one.
 #[test]
 fn a_leg_resumed_before_its_end_keeps_the_jerk() {
@@ -434,42 +329,6 @@ fn a_job_interrupted_and_resumed_takes_the_same_path() {
         assert_eq!(samples.last().map(|sample| sample.cl_nm), Some(home_nm));
         assert!(samples.iter().any(|sample| sample.state == State::Held));
         check_commands(header, words, whole, &interruptions);
-    }
-}
-
-/// The dome on curved passes from the edge, zig or zigzag.
-fn curved_dome(zigzag: bool) -> &'static Undisturbed {
-    static ALL: OnceLock<[Undisturbed; 2]> = OnceLock::new();
-    let all = ALL.get_or_init(|| {
-        [Pattern::Zig, Pattern::Zigzag].map(|pattern| {
-            let (mut header, words) = dome_within_limits(pattern);
-            header.spacing = Spacing::Constant;
-            undisturbed((header, words))
-        })
-    });
-    &all[usize::from(zigzag)]
-}
-
-proptest! {
-    #![proptest_config(ProptestConfig::with_cases(40))]
-
-    /// Holds, overrides, stops and starts on curved passes.
-    #[test]
-    fn no_sequence_of_commands_breaks_a_limit_on_curves(
-        zigzag in any::<bool>(),
-        commands in proptest::collection::vec(command(3000), 0..14),
-    ) {
-        let (header, words, whole) = curved_dome(zigzag);
-        check_commands(header, words, whole, &commands);
-    }
-}
-
-proptest! {
-    #![proptest_config(ProptestConfig::with_cases(if cfg!(debug_assertions) { 400 } else { 4000 }))]
-
-    #[test]
-    fn no_sequence_of_commands_breaks_a_limit(((header, words, whole), commands) in sequence(14)) {
-        check_commands(header, words, whole, &commands);
     }
 }
 
@@ -521,13 +380,13 @@ fn stop_and_abort() {
 }
 
 /// A run that was stopped, on its way up: the tool is a millimetre above the surface or more.
-fn on_the_way_up(used: &mut Use) -> (Box<Interpolator>, AxisLimits) {
+fn on_the_way_up(used: &mut Uses) -> (Box<Interpolator>, AxisLimits) {
     let (header, words, _) = undisturbed(dome_within_limits(Pattern::Zigzag));
     let axes = header.axes.unwrap();
     let mut core = machine(&header, &words);
     let mut step = |inputs: Inputs| {
         let sample = period(&mut core, inputs);
-        used.add(&sample, &axes);
+        used.add(&sample, &axes, 1e-3);
         sample
     };
     step(Command::Start.into());
@@ -544,11 +403,11 @@ fn on_the_way_up(used: &mut Use) -> (Box<Interpolator>, AxisLimits) {
 #[test]
 fn the_way_up_of_a_stop_obeys() {
     for ends in [Command::Resume, Command::Abort, Command::Stop] {
-        let mut used = Use::default();
+        let mut used = Uses::default();
         let (mut core, axes) = on_the_way_up(&mut used);
         let mut step = |core: &mut Interpolator, inputs: Inputs| {
             let sample = period(core, inputs);
-            used.add(&sample, &axes);
+            used.add(&sample, &axes, 1e-3);
             sample
         };
         step(&mut core, Command::Hold.into());
@@ -568,7 +427,7 @@ fn the_way_up_of_a_stop_obeys() {
         assert_eq!(at == axes.safe_z_nm, ends != Command::Abort, "{ends:?}: {at}");
         used.check(&format!("{ends:?}"));
     }
-    let (mut core, axes) = on_the_way_up(&mut Use::default());
+    let (mut core, axes) = on_the_way_up(&mut Uses::default());
     let at = |percent| Inputs {
         command: None,
         feed_override: percent,

@@ -3,6 +3,8 @@
 #![allow(clippy::unwrap_used, reason = "a test may fail by panic")]
 
 pub mod golden;
+pub mod motion;
+pub mod sequences;
 
 use controller::{
     machine::{Busy, Instruction, Machine, describe},
