@@ -19,6 +19,8 @@ const ENDS: usize = 60_000;
 const STANDS: u32 = 4;
 /// Words of the store behind a job with curved passes.
 const FRONTS: usize = 6000;
+/// Override below which a tool that moves may seem to stand, %.
+const SLOW: u8 = 20;
 /// Periods in which the feed follows a lower override.
 const FOLLOWS: usize = 500;
 /// Share of the feed that is rounding.
@@ -277,6 +279,8 @@ impl Run<'_> {
         }
         self.follows = self.follows.saturating_sub(1);
         self.percent = percent;
+        // The first pass of a run is planned at rest.
+        self.held |= command == Some(Command::Start);
         self.stops |= matches!(command, Some(Command::Stop | Command::Abort));
         let inputs = Inputs {
             command,
@@ -346,7 +350,7 @@ impl Run<'_> {
 
     /// A stand at an end of a pass while a feed is commanded, that no hold has begun.
     fn count_stand(&mut self, before: &Sample, sample: &Sample) {
-        self.held |= self.percent == 0 || matches!(sample.state, State::Holding | State::Held);
+        self.held |= self.percent < SLOW || matches!(sample.state, State::Holding | State::Held);
         let stands = sample.cl_nm == before.cl_nm
             && matches!(sample.state, State::Running | State::Linking)
             && !self.held

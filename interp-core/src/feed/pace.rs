@@ -16,7 +16,7 @@ pub(crate) use super::room::{Use, room_of};
 /// Periods from the start of a search to the change that it finds, for the search: some, and as many as some places take; those of a quintic, as a multiple of the
 /// shortest one's.
 const LATENCY: u16 = 5;
-const PLACES_A_PERIOD: f32 = 12.0;
+const PLACES_A_PERIOD: f32 = 11.0;
 const QUINTIC_PLACES: f32 = 1.3;
 /// The most of it, and steps in which the place there is found.
 const LATENCY_MAX: u16 = 96;
@@ -40,12 +40,16 @@ const LATENCY_ABOVE: u16 = 3;
 const ABOVE_PLACES: f32 = 1.4;
 /// Time before its return at which a further pace above 1 is sought, s; periods after a search that found none until the next.
 const RENEWED_S: f32 = 0.12;
-const ABOVE_WAIT: u16 = 25;
+const ABOVE_WAIT: u16 = 40;
 /// The greatest pace of the first change above 1, so that it is short and soon found.
 const ABOVE_FIRST: f32 = 1.25;
 /// Greatest share of the velocity limits above 1, and difference between two paces above 1 that are one.
 const ABOVE_VELOCITY: f32 = 0.996;
 const ABOVE_SAME: f32 = 0.01;
+
+/// Duration of a stop for which a shorter one is sought, s, and how often: the next plan, for which it is made, has to wait.
+const LONG_STOP_S: f32 = 0.35;
+const LONG_STOP_SEARCHES: u8 = 2;
 
 /// Change of the pace that is none.
 const SAME: f32 = 1e-6;
@@ -87,6 +91,8 @@ pub(crate) struct Pace<C> {
     goal: f32,
     wanted: f32,
     is_fault: bool,
+    /// Whether a long stop is followed that a search may find a shorter one for.
+    is_long_stop: bool,
     /// The pace above 1 that is wanted, or 1; the one that there is time for; the periods for which none is sought; the greatest of the change that is followed.
     above: f32,
     most: f32,
@@ -110,6 +116,7 @@ impl<C: Copy> Pace<C> {
         goal: 0.0,
         wanted: 0.0,
         is_fault: false,
+        is_long_stop: false,
         above: 1.0,
         most: 1.0,
         wait: 0,
@@ -129,6 +136,7 @@ impl<C: Copy> Pace<C> {
         self.time = 0.0;
         self.is_fault = false;
         (self.above, self.ceiling, self.wait) = (1.0, 1.0, 0);
+        self.is_long_stop = false;
         (self.failures, self.timeouts) = (0, 0);
         (self.goal, self.wanted, self.period) = (pace, pace, period);
     }
@@ -171,6 +179,8 @@ impl<C: Copy> Pace<C> {
         (self.time, self.goal, self.wanted) = (0.0, 0.0, 0.0);
         self.on_profile = false;
         self.search = None;
+        self.failures = 0;
+        self.is_long_stop = seconds > LONG_STOP_S;
     }
 
     /// The pace that it comes to.
@@ -210,7 +220,8 @@ impl<C: Copy> Pace<C> {
             Some([top, until_s]) => until_s > 0.0 && top > self.above + SAME,
             None => false,
         };
-        (self.wanted - self.goal).abs() > SAME || is_too_fast()
+        let is_slow_to_stop = self.is_long_stop && self.wanted == 0.0 && self.failures < LONG_STOP_SEARCHES;
+        (self.wanted - self.goal).abs() > SAME || is_slow_to_stop || is_too_fast()
     }
 
     /// Whether a pace above 1 is to be sought: at a constant 1, or before the return from above.
@@ -280,6 +291,7 @@ impl<C: Copy> Pace<C> {
         {
             self.change = None;
             self.ceiling = 1.0;
+            self.is_long_stop = false;
         }
         pace.at_least(0.0)
     }
@@ -301,6 +313,7 @@ impl<C: Copy> Pace<C> {
         }
         (self.time, self.goal) = (0.0, search.goal);
         (self.failures, self.timeouts) = (0, 0);
+        self.is_long_stop = false;
         self.search = None;
     }
 

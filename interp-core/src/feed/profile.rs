@@ -30,6 +30,8 @@ const PACE_MIN: f32 = -1e-5;
 const SECOND_MAX: f32 = 4.0;
 /// Share of the r' that the accelerations allow that is aimed at, and the one down to which a segment goes on.
 const AIMED: f32 = 0.985;
+/// Share of it that is rounding and what happens within a slot.
+const BEYOND: f32 = 0.004;
 const KEPT: f32 = 0.97;
 /// Greatest r', as a multiple of one over a slot: where the tool hardly moves, speed and acceleration of the plan change much within a slot.
 const FIRST_MAX: f32 = 0.05;
@@ -442,7 +444,10 @@ impl Making {
     ) -> Option<f32> {
         let most = SECOND_MAX / (slot_s * slot_s);
         let [low, high] = [span.second[0].at_least(-most), span.second[1].at_most(most)];
-        if low > high {
+        // Not even the greatest change of r' leads to what the accelerations allow.
+        let [_, allowed] = span.first;
+        let is_too_fast = first + low * slot_s > allowed + BEYOND * allowed.abs();
+        if low > high || is_too_fast {
             self.most = SLOWER * first.at_most(self.most).at_least(0.0);
             self.until = self.until.max(self.slots + 1);
             return None;

@@ -30,7 +30,9 @@ const ROOM_ABOVE: Use = Use {
 };
 const ABOVE_PLANNED: f32 = 1.002;
 /// Share of the jerk in [`ROOM`] that a change may use near a turn, whose jerk is known at its stations only.
-const JERK_NEAR_TURNS: f32 = 0.9;
+const JERK_NEAR_TURNS: f32 = 0.89;
+/// The least that it may use there, times the cube of the pace: somewhat more than the plan's own jerk at that pace, which cannot be less.
+const JERK_OF_PLAN: f32 = 0.985;
 /// The same after a fault.
 const ROOM_FAULT: Use = Use {
     feed: 1.0,
@@ -90,7 +92,9 @@ pub(super) fn room_of_change(is_fault: bool, pace: f32, widest: f32) -> Use {
     let mut room = *room_of(is_fault, pace);
     let is_planned = (NEARLY_PLANNED..=ABOVE_PLANNED).contains(&pace);
     if widest < SPACING_WIDE && !is_planned {
-        room.jerk *= JERK_NEAR_TURNS;
+        room.jerk = (JERK_NEAR_TURNS * room.jerk)
+            .at_least(JERK_OF_PLAN * pace * pace * pace)
+            .at_most(room.jerk);
     }
     room
 }

@@ -20,10 +20,9 @@ const PLACES_MAX: f32 = 200.0;
 /// Greatest change of the pace in a period: where the tool hardly moves, the plan's own motion changes as fast.
 const CHANGE_MAX: f32 = 0.05;
 
-/// Paces below 0 and above 1 that are rounding, the latter as a ratio.
+/// Paces below 0 and above the greatest that are rounding, the latter as a ratio.
 const PACE_MIN: f32 = -2e-6;
-const PACE_MAX: f32 = 1.00002;
-const ABOVE_MAX: f32 = 1.000_008;
+const PACE_MAX: f32 = 1.000_008;
 
 /// Shares of the room that a profile uses: what happens within a slot.
 const PROFILE_ACCELERATION: f32 = 0.995;
@@ -314,11 +313,7 @@ impl<C: Copy> Search<C> {
         let room = room_of_change(bounds.is_fault, pace, self.widest);
         let mut ratio = course.use_at(&self.at, rates, 0.5 * step).ratio(&room);
         ratio = ratio.at_least(first.abs() * bounds.period * (1.0 / CHANGE_MAX));
-        let most = if bounds.ceiling > 1.0 {
-            ABOVE_MAX * bounds.ceiling
-        } else {
-            PACE_MAX
-        };
+        let most = PACE_MAX * bounds.ceiling;
         if !(PACE_MIN..=most).contains(&pace) {
             ratio = ratio.at_least(RATIO_MAX);
         }

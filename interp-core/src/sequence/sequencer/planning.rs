@@ -22,8 +22,8 @@ const SPARE_PERIODS: u32 = 15;
 
 /// Cycles of one place of a search for a change of the pace, along a pass and along a link, and of its begin along a pass; of a portion of a
 /// step-over's planning.
-const PACE_CYCLES: u32 = 2_150;
-const PACE_BEGIN_CYCLES: u32 = 9_500;
+const PACE_CYCLES: u32 = 2_400;
+const PACE_BEGIN_CYCLES: u32 = 14_000;
 const LINK_PACE_CYCLES: u32 = 1_300;
 const STEP_OVER_CYCLES: u32 = 6_000;
 
@@ -45,7 +45,7 @@ const REPLANNED: f32 = 1.001;
 const PERIODS_A_NODE: f32 = 3.4;
 const PERIODS_A_PASS: f32 = 100.0;
 /// How much longer the planning of a pass may take than that of the last one, as a ratio, and apart from that, periods.
-const LONGER: f32 = 1.2;
+const LONGER: f32 = 1.3;
 const LONGER_PERIODS: f32 = 30.0;
 /// Periods that the planning of a step-over takes at most.
 const PERIODS_A_STEP_OVER: f32 = 40.0;
@@ -102,7 +102,9 @@ impl Sequencer {
         }
         match self.planning {
             Planning::Requested(..) | Planning::Stations | Planning::Feed => {
-                self.spent = self.spent.saturating_add(1);
+                // Periods in which a change of the pace is sought are none of the planning's.
+                let is_searching = matches!(self.phase, Phase::Pass | Phase::Turn) && self.pace.has_work();
+                self.spent = self.spent.saturating_add(u32::from(!is_searching));
             }
             Planning::Complete => {
                 if let Ok(job) = program.job(store)
