@@ -140,7 +140,7 @@ fn direction(
     ranges: [[f64; 2]; 2],
     tolerance_mm: f64,
 ) -> Result<Axis, FitError> {
-    let (range, other) = (ranges[k], ranges[1 - k]);
+    let range = ranges[k];
     let mut breaks = vec![(range[0], 0)];
     // A break of continuity C2 or more needs no knot of its own.
     breaks.extend(
@@ -149,14 +149,6 @@ fn direction(
             .filter(|(_, order)| *order < 2),
     );
     breaks.push((range[1], 0));
-    let whole = Periodic::new(surface);
-    let point = |t: f64, line: f64| {
-        let (u, v) = if k == 0 { (t, line) } else { (line, t) };
-        whole.at(u, v).point
-    };
-    let lines: Vec<f64> = (0..LINES)
-        .map(|i| other[0] + (other[1] - other[0]) * i as f64 / (LINES - 1) as f64)
-        .collect();
     // Number of equal parts of each span between joints.
     let mut parts = vec![1_usize; breaks.len() - 1];
     loop {
@@ -164,22 +156,7 @@ fn direction(
             return Err(FitError::TooManySpans);
         }
         let collocation = Collocation::new(knots(&divided(&breaks, &parts)));
-        let mut worst = vec![0.0_f64; parts.len()];
-        for &line in &lines {
-            let points: Vec<DVec3> = collocation.places.iter().map(|t| point(*t, line)).collect();
-            if !points.iter().all(|point| point.is_finite()) {
-                return Err(FitError::NotFinite);
-            }
-            let poles = collocation.solve(&points);
-            for ((worst, span), parts) in worst.iter_mut().zip(breaks.windows(2)).zip(&parts) {
-                let places = PLACES * parts;
-                for i in 0..places {
-                    let t = span[0].0 + (span[1].0 - span[0].0) * (i as f64 + 0.5) / places as f64;
-                    let fitted = on_curve(&collocation.axis, &poles, t);
-                    *worst = worst.max(fitted.distance(point(t, line)));
-                }
-            }
-        }
+        let worst = errors(surface, k, ranges[1 - k], &collocation, &breaks, &parts)?;
         if worst.iter().all(|worst| *worst <= tolerance_mm) {
             return Ok(collocation.axis);
         }
@@ -197,6 +174,69 @@ fn direction(
             }
         }
     }
+}
+
+/// Knots of one direction with which the lines in that direction are within the tolerance, apart from those of the surface: only where its tangent plane jumps they are kept. A span is halved while it
+/// is beyond the tolerance. Surfaces of many short pieces, which are smooth but for the file's knots, take fewer spans so.
+fn fewest(surface: &Surface, k: usize, ranges: [[f64; 2]; 2], tolerance_mm: f64) -> Result<Axis, FitError> {
+    let range = ranges[k];
+    let mut breaks = vec![(range[0], 0)];
+    breaks.extend(
+        joints(surface, k, range)
+            .into_iter()
+            .filter(|(_, order)| *order == 0),
+    );
+    breaks.push((range[1], 0));
+    loop {
+        if breaks.len() > SPANS_MAX + 1 {
+            return Err(FitError::TooManySpans);
+        }
+        let collocation = Collocation::new(knots(&breaks));
+        let whole = vec![1; breaks.len() - 1];
+        let worst = errors(surface, k, ranges[1 - k], &collocation, &breaks, &whole)?;
+        if worst.iter().all(|worst| *worst <= tolerance_mm) {
+            return Ok(collocation.axis);
+        }
+        let parts: Vec<usize> = worst
+            .iter()
+            .map(|worst| 1 + usize::from(*worst > tolerance_mm))
+            .collect();
+        breaks = divided(&breaks, &parts);
+    }
+}
+
+/// The largest error between two breaks each, on lines in that direction at even places of the other range: at [`PLACES`] for each of the parts.
+fn errors(
+    surface: &Surface,
+    k: usize,
+    other: [f64; 2],
+    collocation: &Collocation,
+    breaks: &[(f64, usize)],
+    parts: &[usize],
+) -> Result<Vec<f64>, FitError> {
+    let whole = Periodic::new(surface);
+    let point = |t: f64, line: f64| {
+        let (u, v) = if k == 0 { (t, line) } else { (line, t) };
+        whole.at(u, v).point
+    };
+    let mut worst = vec![0.0_f64; parts.len()];
+    for line in 0..LINES {
+        let line = other[0] + (other[1] - other[0]) * line as f64 / (LINES - 1) as f64;
+        let points: Vec<DVec3> = collocation.places.iter().map(|t| point(*t, line)).collect();
+        if !points.iter().all(|point| point.is_finite()) {
+            return Err(FitError::NotFinite);
+        }
+        let poles = collocation.solve(&points);
+        for ((worst, span), parts) in worst.iter_mut().zip(breaks.windows(2)).zip(parts) {
+            let places = PLACES * parts;
+            for i in 0..places {
+                let t = span[0].0 + (span[1].0 - span[0].0) * (i as f64 + 0.5) / places as f64;
+                let fitted = on_curve(&collocation.axis, &poles, t);
+                *worst = worst.max(fitted.distance(point(t, line)));
+            }
+        }
+    }
+    Ok(worst)
 }
 
 /// The breaks with each span divided into `parts`; new breaks have full continuity.
@@ -273,19 +313,29 @@ pub(super) fn deviation(surface: &Surface, fit: &SplineSurface) -> Deviation {
     worst
 }
 
-/// A bicubic B-spline within the tolerance of the surface over a rectangle, with a nearly minimal number of spans; C2
-/// except where the surface is not.
+/// Which knots of a surface a fit keeps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Knots {
+    /// Those at which a second derivative jumps: the fit is C2 where the surface is.
+    OfSurface,
+    /// Those at which its tangent plane jumps.
+    Fewest,
+}
+
+/// A bicubic B-spline within the tolerance of the surface over a rectangle, with a nearly minimal number of spans for these knots.
 pub(super) fn fit(
     surface: &Surface,
     ranges: [[f64; 2]; 2],
     tolerance_mm: f64,
+    knots: Knots,
 ) -> Result<(SplineSurface, Deviation), FitError> {
     let mut share = SHARE;
     for _ in 0..ROUNDS {
-        let axes = [
-            direction(surface, 0, ranges, share * tolerance_mm)?,
-            direction(surface, 1, ranges, share * tolerance_mm)?,
-        ];
+        let axis = |k: usize| match knots {
+            Knots::OfSurface => direction(surface, k, ranges, share * tolerance_mm),
+            Knots::Fewest => fewest(surface, k, ranges, share * tolerance_mm),
+        };
+        let axes = [axis(0)?, axis(1)?];
         let fit = interpolated(surface, axes)?;
         let measured = deviation(surface, &fit);
         if measured.max_mm <= tolerance_mm {

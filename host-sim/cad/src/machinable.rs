@@ -1,7 +1,7 @@
 //! Conversion of a face to the surface of a job: exact up to the degree of the core, otherwise fitted within a tolerance.
 
 use super::exact::exact;
-use super::fit::{Deviation, FitError, deviation, fit};
+use super::fit::{Deviation, FitError, Knots, deviation, fit};
 use super::spline::SplineSurface;
 use super::surface::Periodic;
 use super::trim::{Polygon, trim};
@@ -267,21 +267,27 @@ fn fitted(
             ),
         )
     };
-    let made = fit(&face.surface, rectangle, options.tolerance_mm);
-    let (spline, _) = made.map_err(|error| match error {
-        FitError::TooManySpans => too_fine(format!(
-            "no fit within {} mm has few enough spans",
-            options.tolerance_mm
-        )),
-        FitError::NotFinite => CadError::face(
-            file,
-            format!("{name}: it has no point at some of its parameters"),
-            "choose another face; import --list shows them",
-        ),
-    })?;
-    let nurbs = nurbs(&spline);
-    let patches = patches(&nurbs)
-        .map_err(|still| too_fine(format!("of a fit within {} mm {still}", options.tolerance_mm)))?;
+    let made = |knots: Knots| {
+        let made = fit(&face.surface, rectangle, options.tolerance_mm, knots);
+        let (spline, _) = made.map_err(|error| match error {
+            FitError::TooManySpans => too_fine(format!(
+                "no fit within {} mm has few enough spans",
+                options.tolerance_mm
+            )),
+            FitError::NotFinite => CadError::face(
+                file,
+                format!("{name}: it has no point at some of its parameters"),
+                "choose another face; import --list shows them",
+            ),
+        })?;
+        let nurbs = nurbs(&spline);
+        let patches = patches(&nurbs)
+            .map_err(|still| too_fine(format!("of a fit within {} mm {still}", options.tolerance_mm)))?;
+        Ok((spline, nurbs, patches))
+    };
+    // A surface of many short pieces may be smoother than its knots tell.
+    let (spline, nurbs, patches) =
+        made(Knots::OfSurface).or_else(|error| made(Knots::Fewest).map_err(|_: CadError| error))?;
     let deviation = deviation(&face.surface, &spline);
     Ok(MachinableFace {
         nurbs,

@@ -3,6 +3,7 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use super::exact::exact;
+use super::fit::Knots;
 use super::*;
 use glam::{DVec3, dvec3};
 
@@ -501,7 +502,8 @@ fn a_fit_over_the_seam_follows_the_surface() {
     for (surface, widest) in [(&surface, 1.0), (&offset, 0.9)] {
         for first in [0.6, 0.999, 1e-9] {
             let range = [start + first * period, start + (first + widest) * period];
-            let (fitted, said) = super::fit::fit(surface, [range, [0.0, 1.0]], 1e-3).unwrap();
+            let (fitted, said) =
+                super::fit::fit(surface, [range, [0.0, 1.0]], 1e-3, Knots::OfSurface).unwrap();
             assert!(said.max_mm <= 1e-3, "{said:?}");
             for k in 0..=400 {
                 let u = range[0] + (range[1] - range[0]) * f64::from(k) / 400.0;
@@ -511,6 +513,62 @@ fn a_fit_over_the_seam_follows_the_surface() {
             }
         }
     }
+}
+
+/// A surface of more pieces than the store holds, smooth but for the jumps of its second derivative, takes few patches.
+#[test]
+fn knots_that_the_tolerance_does_not_need_are_left_out() {
+    const PIECES: u32 = 400;
+    let step = 60.0 / f64::from(PIECES);
+    let wave = |k: u32| {
+        let x = f64::from(k) * step;
+        ([x, 2.0 * (0.2 * x).sin()], [1.0, 0.4 * (0.2 * x).cos()])
+    };
+    let mut profile: Vec<[f64; 2]> = Vec::new();
+    for k in 0..=PIECES {
+        let (at, slope) = wave(k);
+        // Cubic pieces through points of the wave with its slopes: C1.
+        let beside = |by: f64| [0, 1].map(|axis| at[axis] + by * step / 3.0 * slope[axis]);
+        let poles = match k {
+            0 => vec![at, beside(1.0)],
+            PIECES => vec![beside(-1.0), at],
+            _ => vec![beside(-1.0), beside(1.0)],
+        };
+        profile.extend(poles);
+    }
+    let mut knots = vec![0.0; 4];
+    knots.extend((1..PIECES).flat_map(|k| [f64::from(k); 2]));
+    knots.extend(vec![f64::from(PIECES); 4]);
+    let surface = Surface::Spline(SplineSurface {
+        axes: [
+            Axis { degree: 3, knots },
+            Axis {
+                degree: 1,
+                knots: vec![0.0, 0.0, 1.0, 1.0],
+            },
+        ],
+        poles: profile
+            .iter()
+            .map(|[x, z]| [0.0, 20.0].map(|y| [*x, y, *z, 1.0]).to_vec())
+            .collect(),
+    });
+    let ranges = [[0.0, f64::from(PIECES)], [0.0, 1.0]];
+    assert!(super::fit::fit(&surface, ranges, 1e-3, Knots::OfSurface).is_err());
+    let (fitted, said) = super::fit::fit(&surface, ranges, 1e-3, Knots::Fewest).unwrap();
+    assert!(
+        fitted.patches() < 40 && said.max_mm <= 1e-3,
+        "{} {said:?}",
+        fitted.patches()
+    );
+    let corners = [
+        [ranges[0][0], 0.0],
+        [ranges[0][1], 0.0],
+        [ranges[0][1], 1.0],
+        [ranges[0][0], 1.0],
+    ];
+    let face = face(surface.clone(), vec![around(&surface, &corners)], 1.0);
+    let made = machinable("wave", &face, &Options::default()).unwrap();
+    assert_eq!(made.patches, fitted.patches());
 }
 
 /// Ends of a range that differ from a knot by rounding make no joint.
@@ -529,7 +587,8 @@ fn knots_at_the_ends_are_no_joints() {
             let joints = super::exact::joints(&surface, 0, range);
             assert_eq!(joints.len(), 1, "{range:?}: {joints:?}");
             assert_eq!(joints[0].1, 4);
-            let (fitted, said) = super::fit::fit(&surface, [range, [0.0, 1.0]], 1e-3).unwrap();
+            let (fitted, said) =
+                super::fit::fit(&surface, [range, [0.0, 1.0]], 1e-3, Knots::OfSurface).unwrap();
             assert!(
                 said.max_mm <= 1e-3 && fitted.patches() < 40,
                 "{} patches",
