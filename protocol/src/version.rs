@@ -4,7 +4,7 @@ use core::fmt;
 
 /// Version of the messages in [`crate::message`]. It is incremented with every incompatible change; the
 /// frame, `Hello` and `Capabilities` never change.
-pub const PROTOCOL_VERSION: u16 = 8;
+pub const PROTOCOL_VERSION: u16 = 9;
 
 /// Host and board have different versions; no other message can be decoded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -62,7 +62,7 @@ pub(super) fn read(section: &Section<'_>, surface: &SurfaceSpec) -> Result<Regio
             "put the vertices in their order around the region; loops may lie inside one another or touch, but not cross",
         ));
     }
-    Ok(Region { loops })
+    Ok(Region::new(loops))
 }
 
 /// The vertices of a loop, without repetitions, and where they are written.

@@ -7,11 +7,32 @@ pub struct Region {
     /// The polygons: vertices `[u, v]`, in the parameters of the placed surface ([`crate::Job::surface`]), within its domain. The edge from the last
     /// vertex back to the first belongs to the polygon. Either sense of rotation.
     pub loops: Vec<Vec<[f64; 2]>>,
+    /// Its cells in the order in which they are machined, each as polygons as above; together they are the region. Empty where it is machined line by line.
+    pub cells: Vec<Vec<Vec<[f64; 2]>>>,
 }
 
 impl Region {
     /// Most vertices of all loops together: more than the board's store takes.
     pub const VERTICES_MAX: usize = 4096;
+
+    /// The region that these polygons enclose, machined line by line.
+    #[must_use]
+    pub const fn new(loops: Vec<Vec<[f64; 2]>>) -> Self {
+        Self {
+            loops,
+            cells: Vec::new(),
+        }
+    }
+
+    /// What is machined line by line, one after the other: its cells, or all of it.
+    #[must_use]
+    pub fn parts(&self) -> Vec<Self> {
+        if self.cells.is_empty() {
+            vec![Self::new(self.loops.clone())]
+        } else {
+            self.cells.iter().cloned().map(Self::new).collect()
+        }
+    }
 
     /// The edges of all loops, each as its two ends.
     pub fn edges(&self) -> impl Iterator<Item = [[f64; 2]; 2]> + '_ {
@@ -50,9 +71,7 @@ mod tests {
     #[test]
     fn a_loop_inside_another_is_a_hole() {
         let square = |low: f64, high: f64| vec![[low, low], [high, low], [high, high], [low, high]];
-        let region = Region {
-            loops: vec![square(0.0, 10.0), square(3.0, 7.0), square(4.0, 5.0)],
-        };
+        let region = Region::new(vec![square(0.0, 10.0), square(3.0, 7.0), square(4.0, 5.0)]);
         for (at, inside) in [
             ([1.0, 1.0], true),
             ([3.5, 6.0], false),

@@ -6,6 +6,7 @@
 use std::fmt;
 
 use crate::Machine;
+use crate::cells;
 use crate::prepare::{Prepared, prepare};
 use explain;
 use job::{Along, AlongChoice, DirectionTrial, Job, JobError, Spacing, SpacingTrial, Start, StartChoice};
@@ -67,8 +68,9 @@ pub(crate) fn fastest(first: TrialResult, second: TrialResult) -> TrialResult {
 ///
 /// # Errors
 /// What is given cannot be prepared, or, with `"auto"`, no choice can be machined.
-pub fn choose(job: Job) -> Result<Ready, DirectionError> {
+pub fn choose(mut job: Job) -> Result<Ready, DirectionError> {
     if !job.origin.has_to_choose() {
+        cells::settle(&mut job);
         let prepared = prepare(&job).map_err(DirectionError::Refused)?;
         return Ok((job, prepared));
     }
@@ -164,6 +166,7 @@ pub(crate) fn run_trial(job: &Job, along: Along, spacing: Spacing, ticks_max: u6
     (job.along, job.spacing) = (along, spacing);
     job.origin.set_along_choice(AlongChoice::Given);
     job.origin.set_start_choice(StartChoice::Given);
+    cells::settle(&mut job);
     let trial = |ticks: u64, rejection: Option<String>| SpacingTrial {
         spacing,
         ticks,

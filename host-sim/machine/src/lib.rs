@@ -6,6 +6,7 @@
 //! ```
 
 pub mod advice;
+mod cells;
 pub mod direction;
 mod in_process;
 pub mod links;

@@ -2,7 +2,7 @@
 //!
 //! Passes do not depend on their links, so the job is run once with every link at the safe height, and then given its words.
 
-use interp_core::job::LINK_STRAIGHT;
+use interp_core::job::links::{Detour, LINK_HEIGHT_MIN, LINK_STRAIGHT};
 use interp_core::{STORE_WORDS, State};
 
 use crate::Machine;
@@ -13,6 +13,8 @@ use crate::prepare::Prepared;
 pub enum Link {
     /// Straight, at the feed.
     Straight,
+    /// Around what is between, at the feed.
+    Around(Detour),
     /// Up to this height of the ball's centre, nm, across, and down.
     Across(i32),
 }
@@ -54,6 +56,7 @@ pub fn add(prepared: &mut Prepared, links: &[Link]) {
         .words
         .extend(links.iter().take(room).map(|link| match link {
             Link::Straight => LINK_STRAIGHT,
-            Link::Across(height_nm) => (*height_nm).max(LINK_STRAIGHT + 1),
+            Link::Around(detour) => detour.to_word(),
+            Link::Across(height_nm) => (*height_nm).max(LINK_HEIGHT_MIN),
         }));
 }

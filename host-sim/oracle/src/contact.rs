@@ -6,7 +6,7 @@ use super::derivatives::Derivatives;
 use super::region::RegionEdges;
 use super::surface::Surface;
 use glam::DVec3;
-use job::{Along, Job, Pattern, Side, Spacing};
+use job::{Along, Job, Pattern, Region, Side, Spacing};
 
 /// A first derivative shorter than this share of the other one (each times its range) marks a pole, where the patch's
 /// edge collapses to a point. Rounding leaves about 1e-15 there; a regular surface stays above 1e-4.
@@ -135,6 +135,8 @@ pub struct Oracle {
     pub overruns: bool,
     /// The region that is machined; `None` for the whole surface.
     pub region: Option<RegionEdges>,
+    /// What of it is machined line by line, one after the other.
+    pub(super) cells: Vec<RegionEdges>,
 }
 
 /// Curvatures of a contact, 1/mm; see [`Contact`].
@@ -156,20 +158,24 @@ impl Oracle {
             Side::Plus => 1.0,
             Side::Minus => -1.0,
         };
-        let region = job.region.as_ref().map(|region| {
-            let breaks = match job.along {
-                Along::U => [Along::U, Along::V],
-                Along::V => [Along::V, Along::U],
-            };
+        let breaks = match job.along {
+            Along::U => [Along::U, Along::V],
+            Along::V => [Along::V, Along::U],
+        };
+        let edges = |region: &Region| {
             RegionEdges::new(
                 region,
                 job.along,
                 breaks.map(|parameter| surface.breaks(parameter)),
             )
-        });
+        };
+        let region = job.region.as_ref().map(edges);
+        let parts = job.region.as_ref().map_or_else(Vec::new, Region::parts);
+        let cells = parts.iter().map(edges).collect();
         Ok(Self {
             surface,
             region,
+            cells,
             along: job.along,
             pattern: job.pattern,
             normal_sign,

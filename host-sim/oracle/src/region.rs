@@ -97,6 +97,22 @@ impl RegionEdges {
 }
 
 impl Oracle {
+    /// The same for a cell of the region alone; the whole where the job has none.
+    pub(super) fn of_cell(&self, index: usize) -> Self {
+        Self {
+            region: self.cells.get(index).cloned(),
+            cells: Vec::new(),
+            ..self.clone()
+        }
+    }
+
+    /// Whether a pass that starts here is on the first line with an interval.
+    pub(super) fn is_first_line(&self, [path, side]: [f64; 2]) -> bool {
+        let [first, _] = self.pass_range();
+        let is_on = |region: &RegionEdges| region.is_on(path, side);
+        self.region.as_ref().is_none_or(is_on) && self.is_empty_between(first, side)
+    }
+
     /// The region's boundary as lines of (u, v), `parts` points an edge; none where the job has none.
     #[must_use]
     pub fn region_outline(&self, parts: u32) -> Vec<Vec<[f64; 2]>> {

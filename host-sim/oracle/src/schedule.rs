@@ -44,12 +44,23 @@ pub struct ScheduledPass {
 }
 
 impl Oracle {
-    /// All passes from one boundary of the side parameter to the other (steps 5 and 6), or of a region: its intervals on lines from its first to its last.
+    /// All passes from one boundary of the side parameter to the other (steps 5 and 6), or of a region: its intervals on lines from the first to the last of each cell.
     ///
     /// # Errors
     /// [`OracleError::BallDoesNotFit`] and [`OracleError::Degenerate`] at the first such point,
     /// [`OracleError::TooManyPasses`] if the intervals converge to 0.
     pub fn schedule(&self) -> Result<Vec<ScheduledPass>, OracleError> {
+        if self.cells.len() < 2 {
+            return self.schedule_of_one();
+        }
+        let mut passes = Vec::new();
+        for index in 0..self.cells.len() {
+            passes.extend(self.of_cell(index).schedule_of_one()?);
+        }
+        Ok(passes)
+    }
+
+    fn schedule_of_one(&self) -> Result<Vec<ScheduledPass>, OracleError> {
         let [start, _] = self.pass_range();
         let end = self.last_line();
         let mut passes = Vec::new();

@@ -54,6 +54,9 @@ const START_SHARE: f64 = 1e-6;
 #[derive(Clone, Debug)]
 pub struct Verifier {
     oracle: Oracle,
+    /// The oracle of the cell of the region that the passes are in, and its number.
+    cell: Oracle,
+    cell_index: usize,
     breaks: Vec<f64>,
     report: AccuracyReport,
     current: Option<PassState>,
@@ -95,6 +98,8 @@ impl Verifier {
         Self {
             breaks: oracle.surface.breaks(oracle.along),
             oracle: oracle.clone(),
+            cell: oracle.of_cell(0),
+            cell_index: 0,
             report,
             current: None,
             on_line: Vec::new(),
@@ -125,7 +130,7 @@ impl Verifier {
                 let end = self.at_boundary(sample, path, side);
                 let ends = [self.current.map_or(end, |pass| pass.start), end];
                 self.on_line.push(ends);
-                !self.oracle.is_interval(ends, side)
+                !self.cell.is_interval(ends, side)
             } else {
                 self.is_off(sample, path, side, self.pass_ends(sample.pass)[1])
             };
@@ -155,8 +160,7 @@ impl Verifier {
             };
             self.report.last_on_boundary = if self.oracle.region.is_some() {
                 self.check_line(pass.side);
-                self.oracle
-                    .is_empty_between(pass.side, self.oracle.pass_range()[1])
+                self.is_cell_done(pass.side) && self.cells_without_pass(self.cell_index + 1)
             } else {
                 pass.side == end
             };
@@ -195,17 +199,52 @@ impl Verifier {
 
     /// Counts a line of a region that leaves out an interval.
     fn check_line(&mut self, side: f64) {
-        if !self.oracle.is_line_complete(&self.on_line, side) {
+        if !self.cell.is_line_complete(&self.on_line, side) {
             self.report.off_boundary += 1;
         }
         self.on_line.clear();
     }
 
+    /// Whether no pass is left in the cell behind a line.
+    fn is_cell_done(&self, side: f64) -> bool {
+        let [_, last] = self.cell.pass_range();
+        self.cell.is_empty_between(side, last)
+    }
+
+    /// Whether no cell from this one on holds a pass.
+    fn cells_without_pass(&self, from: usize) -> bool {
+        (from..self.oracle.cells.len()).all(|index| {
+            let cell = self.oracle.of_cell(index);
+            let [first, last] = cell.pass_range();
+            cell.is_empty_between(first, last)
+        })
+    }
+
+    /// Goes on to the next cell that holds a pass, where the one before is done at its last line and this one is the first there.
+    fn enters_cell(&mut self, last: Option<f64>, start: [f64; 2]) -> bool {
+        if last.is_some_and(|last| !self.is_cell_done(last)) {
+            return false;
+        }
+        for index in self.cell_index + 1..self.oracle.cells.len() {
+            let cell = self.oracle.of_cell(index);
+            if cell.is_first_line(start) {
+                (self.cell, self.cell_index) = (cell, index);
+                return true;
+            }
+            let [first, last] = cell.pass_range();
+            if !cell.is_empty_between(first, last) {
+                return false;
+            }
+        }
+        false
+    }
+
     /// Begins a pass of a region: on the line of the one before, or on the next one.
-    fn begin_interval(&mut self, sample: &PassSample, side: f64, spot: SampleLocation) {
+    fn begin_interval(&mut self, sample: &PassSample, start: [f64; 2], spot: SampleLocation) {
+        let [_, side] = start;
         let Some(before) = self.current else {
-            let [first, _] = self.oracle.pass_range();
-            self.report.first_on_boundary = sample.pass == 0 && self.oracle.is_empty_between(first, side);
+            let is_first = self.cell.is_first_line(start) || self.enters_cell(None, start);
+            self.report.first_on_boundary = sample.pass == 0 && is_first;
             return;
         };
         if !before.finished || sample.pass != self.report.passes {
@@ -215,11 +254,14 @@ impl Verifier {
             return;
         }
         self.check_line(before.side);
-        // Where the region ends in between, the lines are not neighbours.
-        if side < before.side || self.oracle.intervals(0.5 * (before.side + side)).is_empty() {
+        if self.enters_cell(Some(before.side), start) {
             return;
         }
-        let last = self.oracle.last_line();
+        // Where the region ends in between, the lines are not neighbours.
+        if side < before.side || self.cell.intervals(0.5 * (before.side + side)).is_empty() {
+            return;
+        }
+        let last = self.cell.last_line();
         let interval = before.least_interval.min(last - before.side);
         if self.oracle.spacing == Spacing::FirstOrder && last - side > self.oracle.near_side() {
             // The line is rounded down to a place.
@@ -248,7 +290,10 @@ impl Verifier {
         let is_region = self.oracle.region.is_some();
         let before = self.current;
         match self.current {
-            _ if is_region => self.begin_interval(sample, side, spot),
+            _ if is_region => {
+                let start = [self.at_boundary(sample, path, side), side];
+                self.begin_interval(sample, start, spot);
+            }
             None => {
                 let start = match self.oracle.spacing {
                     Spacing::Constant(Start::Middle) => 0.5 * (first + last),

@@ -60,9 +60,7 @@ impl FaceReader for Faces {
             return Err(nothing(source, &found, job.radius_mm));
         }
         Ok(FaceRegion {
-            region: Region {
-                loops: found.loops.clone(),
-            },
+            region: Region::new(found.loops.clone()),
             reach: found.reach(),
         })
     }

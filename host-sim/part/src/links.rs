@@ -1,10 +1,13 @@
 //! Links between the intervals of a region: only as high as the tool needs over the part, or over the surface itself where no part is known.
 //!
-//! A link rises at the end of a pass, crosses at one height, and comes down at the start of the next. Where the tool stands on both it is clear, and no part of it is taken
+//! A link over the part rises at the end of a pass, crosses at one height, and comes down at the start of the next. Where the tool stands on both it is clear, and no part of it is taken
 //! to be thinner than the ball, so it is clear above both. So the crossing decides: the least height at which the whole tool is clear along it is bisected.
+//!
+//! Past a wall that bulges towards the tool neither the straight way is clear nor any that is not above the wall. There a link goes around: straight to a place beside the middle of both
+//! ends and somewhat above, and straight from there, at the feed. Of all ways that are clear the one that takes least time is taken.
 
 use glam::DVec3;
-use job::Job;
+use job::{AxisLimits, Job};
 use oracle::Surface;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -15,7 +18,7 @@ use crate::tool::Tool;
 use job_file::FaceError;
 
 /// The method by which links are made: others in a cache are not used.
-const METHOD: u32 = 1;
+const METHOD: u32 = 2;
 /// The crossing is at least so much above both ends, mm.
 const LIFT_MM: f64 = 0.3;
 /// Precision of the height of a crossing, mm.
@@ -29,11 +32,30 @@ const STRAIGHT_STEPS: f64 = 2.5;
 const DEPTH_SHARE: f64 = 0.5;
 const DEPTH_MM: f64 = 0.001;
 
+/// Unit of a detour, mm: that of the machine's words.
+const UNIT_MM: f64 = 16_384e-6;
+/// Greatest detour, units: to a side, and upwards.
+const ASIDE_MAX: f64 = 2047.0;
+const RISE_MAX: f64 = 4095.0;
+/// Detours that are tried: to a side and upwards, as shares of the length of the way, which is taken to be at least so long, mm.
+const ASIDES: [f64; 9] = [0.0, 0.1, -0.1, 0.25, -0.25, 0.5, -0.5, 1.0, -1.0];
+const RISES: [f64; 4] = [0.0, 0.1, 0.3, 1.0];
+const DETOUR_MM: f64 = 1.0;
+/// Only a way that saves more is looked for, s.
+const SAVED_S: f64 = 0.05;
+
 /// How a link goes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Way {
     /// Straight to the next pass, at the feed.
     Straight,
+    /// By a place beside the middle of both ends, at the feed: to the left of the way and upwards, in the units of the machine's words.
+    Around {
+        /// To the left.
+        aside: i16,
+        /// Upwards.
+        rise: u16,
+    },
     /// At this height of the ball's centre, mm.
     Across(f64),
 }
@@ -75,6 +97,11 @@ pub fn ways(
             tool: tool.wide(),
             depth,
             safe_mm,
+            may_stay_low: of_part.is_some(),
+            times: Times {
+                feed_mm_s: job.feed_mm_s(),
+                limits: job.machine.limits.unwrap_or(AxisLimits::DEFAULT),
+            },
             straight_mm: of_part.map_or(0.0, |_| {
                 STRAIGHT_STEPS * (8.0 * job.radius_mm * job.scallop_mm).sqrt()
             }),
@@ -91,21 +118,116 @@ struct Links<'a> {
     safe_mm: f64,
     /// The longest straight link, mm.
     straight_mm: f64,
+    /// The job knows the part, so that a way may stay low.
+    may_stay_low: bool,
+    times: Times,
+}
+
+/// The machine's limits, for the times of ways.
+struct Times {
+    feed_mm_s: f64,
+    limits: AxisLimits,
+}
+
+impl Times {
+    /// Of a move from rest to rest.
+    fn of(length: f64, [velocity, acceleration, jerk]: [f64; 3]) -> f64 {
+        let by_jerk = (32.0 * length / jerk).cbrt();
+        let ramps = velocity / acceleration + acceleration / jerk;
+        if length > velocity * ramps {
+            length / velocity + ramps
+        } else {
+            by_jerk.max((4.0 * length / acceleration).sqrt())
+        }
+    }
+
+    fn axis(&self, k: usize) -> [f64; 3] {
+        self.limits.by_order().map(|limit| limit[k])
+    }
+
+    /// Up to a height, across, and down.
+    fn across(&self, [from, to]: [DVec3; 2], height: f64) -> f64 {
+        let beside = (to - from).truncate().length();
+        let up = |z: f64| Self::of((height - z).max(0.0), self.axis(2));
+        up(from.z) + Self::of(beside, self.axis(0)) + up(to.z)
+    }
+
+    /// Along a way of straight moves at the feed.
+    fn at_feed(&self, way: &[DVec3]) -> f64 {
+        let of = |ends: &[DVec3]| {
+            let [velocity, acceleration, jerk] = self.axis(2);
+            Self::of(
+                ends[0].distance(ends[1]),
+                [self.feed_mm_s.min(velocity), acceleration, jerk],
+            )
+        };
+        way.windows(2).map(of).sum()
+    }
 }
 
 impl Links<'_> {
-    fn way(&self, [from, to]: [DVec3; 2]) -> Way {
+    fn way(&self, ends: [DVec3; 2]) -> Way {
+        let [from, to] = ends;
         if from.distance(to) <= self.straight_mm && self.is_clear([from, to], STEP_MM) {
             return Way::Straight;
         }
+        let height = self.height(ends);
+        let over = Way::Across(height);
+        let around = self
+            .may_stay_low
+            .then(|| self.around(ends, self.times.across(ends, height)));
+        around.flatten().unwrap_or(over)
+    }
+
+    /// The fastest way around that takes less time than another.
+    fn around(&self, [from, to]: [DVec3; 2], than_s: f64) -> Option<Way> {
+        let apart = to - from;
+        let length = apart.length().max(DETOUR_MM);
+        let left = DVec3::new(-apart.y, apart.x, 0.0).normalize_or_zero();
+        let units = |share: f64, most: f64| (share * length / UNIT_MM).round().clamp(-most, most);
+        let mut ways: Vec<(f64, [DVec3; 3], Way)> = Vec::new();
+        for (aside, rise) in ASIDES.iter().flat_map(|aside| RISES.map(|rise| (*aside, rise))) {
+            let [aside, rise] = [units(aside, ASIDE_MAX), units(rise, RISE_MAX)];
+            let place = from.lerp(to, 0.5) + UNIT_MM * (aside * left + rise * DVec3::Z);
+            let way = [from, place, to];
+            let time_s = self.times.at_feed(&way);
+            if time_s + SAVED_S < than_s && place.z <= self.safe_mm {
+                #[allow(
+                    clippy::cast_possible_truncation,
+                    clippy::cast_sign_loss,
+                    reason = "at most 12 bits"
+                )]
+                let [aside, rise] = [aside as i16, rise as i16];
+                ways.push((
+                    time_s,
+                    way,
+                    Way::Around {
+                        aside,
+                        rise: rise.unsigned_abs(),
+                    },
+                ));
+            }
+        }
+        ways.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let is_clear = |way: &[DVec3; 3]| {
+            let [from, place, to] = *way;
+            self.is_clear([from, place], STEP_MM) && self.is_clear([place, to], STEP_MM)
+        };
+        ways.into_iter()
+            .find(|(_, way, _)| is_clear(way))
+            .map(|(_, _, way)| way)
+    }
+
+    /// The least height at which the tool crosses.
+    fn height(&self, [from, to]: [DVec3; 2]) -> f64 {
         let at = |z: f64| [from, to].map(|end| DVec3::new(end.x, end.y, z));
         let is_clear = |z: f64| self.is_clear(at(z), STRIDE_MM);
         let least = from.z.max(to.z) + LIFT_MM;
         if least >= self.safe_mm {
-            return Way::Across(self.safe_mm);
+            return self.safe_mm;
         }
         if is_clear(least) {
-            return Way::Across(least);
+            return least;
         }
         let (mut low, mut high) = (least, self.safe_mm);
         while high - low > HEIGHT_MM {
@@ -116,7 +238,7 @@ impl Links<'_> {
                 low = middle;
             }
         }
-        Way::Across(high)
+        high
     }
 
     /// Whether the tool is clear of the part all along a straight way. The distance changes by no more than the tool moves; sideways only, that of what is above the ball.

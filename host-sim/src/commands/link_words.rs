@@ -1,6 +1,7 @@
 //! The links of a region: made for a job when it is read, with the core and the part.
 
 use glam::DVec3;
+use interp_core::job::links::Detour;
 use job::Job;
 use machine::links;
 use machine::prepare::Prepared;
@@ -38,6 +39,10 @@ pub(super) fn add(job: &Job, prepared: &mut Prepared) -> Result<()> {
         .iter()
         .map(|way| match way {
             Way::Straight => links::Link::Straight,
+            Way::Around { aside, rise } => links::Link::Around(Detour {
+                aside: *aside,
+                rise: *rise,
+            }),
             Way::Across(height_mm) => links::Link::Across((height_mm * NM_PER_MM).ceil() as i32),
         })
         .collect();

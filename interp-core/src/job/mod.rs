@@ -7,12 +7,13 @@
 //! | `side_spans` | width of each side span in units of the surface's side parameter, f32 bits |
 //! | `path_spans` | width of each path span, f32 bits (reported only; the step along the path does not use it) |
 //! | of the records | [`SurfaceKind::Polynomial`], [`SurfaceKind::Rational`]: one record per patch, path index fastest; [`SurfaceKind::RevolvedAlongProfile`], [`SurfaceKind::RevolvedAroundAxis`]: one record |
-//! | with a region | its lines and edges: [`region`] |
-//! | [`Header::links`] | for each pass from the second one on: the height of the ball's centre, nm, at which the tool crosses to it, or [`LINK_STRAIGHT`] |
+//! | with a region | its cells and edges: [`region`] |
+//! | [`Header::links`] | for each pass from the second one on: how the tool goes to it, [`links`] |
 //!
 //! The records are described in the files of [`crate::surface`].
 
 pub mod encode;
+pub mod links;
 pub(crate) mod program;
 pub mod region;
 pub(crate) mod stations;
@@ -42,9 +43,6 @@ pub(crate) const STEP_MAX_MM: f32 = 2.0;
 
 /// Maximum cells of a path in the look-ahead, and so maximum patches of a pass of a job with axis limits.
 pub(crate) const CELLS_MAX: usize = 256;
-
-/// The word of a link that goes straight to its pass, at the feed.
-pub const LINK_STRAIGHT: i32 = i32::MIN;
 
 /// Greatest overrun of a turn, mm.
 pub const OVERRUN_MAX_MM: f32 = 100.0;
@@ -193,7 +191,7 @@ pub struct Header {
     pub scallop_mm: f32,
     /// Sampling period T, s, 1e-5 to 0.1.
     pub period_s: f32,
-    /// Edges of the region that is machined, in the words behind the records; 0 for the whole surface. None with passes of constant scallop height.
+    /// Records of the region that is machined, in the words behind the patches: [`region`]; 0 for the whole surface. None with passes of constant scallop height.
     pub edges: u16,
     /// Words of links, the last ones of the job: passes behind them are reached at the safe height. Only with axis limits, straight passes, and all of the job stored.
     pub links: u16,

@@ -2,14 +2,14 @@
 
 use crate::command::OVERRIDE_MAX;
 use crate::fault::{Fault, FaultKind, Result};
+use crate::job::links::Link;
 use crate::job::region::{
-    EDGE_WORDS, EDGES_A_RECORD, FirstLine, HEAD_WORDS, REGION_SPANS_MAX, RegionCheck, RegionWords, ScanLine,
+    EDGE_WORDS, EDGES_A_RECORD, FirstLine, REGION_SPANS_MAX, RegionCheck, RegionWords, ScanLine,
 };
 use crate::job::stations::{SPANS_MAX as FRONT_SPANS_MAX, Stations};
 use crate::job::stream::{DIGEST_WORDS, RecordCopy, Rows, WINDOW_MIN};
 use crate::job::{
-    AxisLimits, CELLS_MAX, Header, LINK_STRAIGHT, OVERRUN_MAX_MM, SPANS_MAX, STEP_MAX_MM, SurfaceKind,
-    width_words,
+    AxisLimits, CELLS_MAX, Header, OVERRUN_MAX_MM, SPANS_MAX, STEP_MAX_MM, SurfaceKind, width_words,
 };
 use crate::math::number::nm_to_mm;
 use crate::surface::{
@@ -71,11 +71,7 @@ pub(crate) fn extent(header: &Header) -> (u32, u64) {
 
 /// Words of a header's region.
 const fn region_words(header: &Header) -> usize {
-    if header.edges == 0 {
-        0
-    } else {
-        HEAD_WORDS + EDGE_WORDS * header.edges as usize
-    }
+    EDGE_WORDS * header.edges as usize
 }
 
 /// Words of the store that a job takes behind its data, for the stations of passes of constant scallop height; none where it crosses more patches than there
@@ -399,7 +395,7 @@ impl Program {
             let is_sound = record < checked
                 || job.region().is_some_and(|region| {
                     if portion == 0 {
-                        self.region.begin(&region);
+                        self.region.begin();
                     }
                     self.region.check(&self.header, &region, portion, line)
                 });
@@ -479,15 +475,6 @@ impl Program {
     }
 }
 
-/// The way to a pass.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Link {
-    /// Straight, at the feed.
-    Straight,
-    /// Up to this height of the ball's centre, nm, across and down.
-    Across(i32),
-}
-
 /// A job and its store.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Job<'a> {
@@ -511,10 +498,10 @@ impl<'a> Job<'a> {
         }
         let end = self.length.checked_sub(self.header.links.into())?;
         let from = end.checked_sub(region_words(self.header))?;
-        RegionWords::new(self.store.get(from..end)?)
+        Some(RegionWords::new(self.store.get(from..end)?))
     }
 
-    /// How the tool goes to a pass that is not joined to the one before it on the surface. A height is not above the safe height.
+    /// How the tool goes to a pass that is not joined to the one before it on the surface.
     pub(crate) fn link_to(&self, pass: u32, axes: &AxisLimits) -> Link {
         let links = u32::from(self.header.links);
         let word = pass
@@ -524,11 +511,7 @@ impl<'a> Job<'a> {
                 let behind = usize::try_from(links - index).ok()?;
                 self.store.get(self.length.checked_sub(behind)?).copied()
             });
-        match word {
-            Some(LINK_STRAIGHT) => Link::Straight,
-            Some(height_nm) => Link::Across(height_nm.min(axes.safe_z_nm)),
-            None => Link::Across(axes.safe_z_nm),
-        }
+        Link::from_word(word.unwrap_or(axes.safe_z_nm), axes)
     }
 
     /// Width of a side span, in units of the side parameter.

@@ -1,12 +1,12 @@
 //! A job's region: the part of the surface that is machined, as the edges of closed polygons in the store, and its intervals on a line of constant side
-//! parameter.
+//! parameter. It is one or more cells, machined one after the other, so that the tool need not cross a hole on each line.
 //!
-//! Words behind the records:
+//! Words behind the patches, four a record:
 //!
-//! | words | content |
+//! | record | content |
 //! |---|---|
-//! | 3 | side of the first and of the last line, shortest interval on the path parameter |
-//! | 4 an edge | side and path at its lower end, side and path at its upper end; sorted by the first |
+//! | head of a cell | number of its edges, side of its first and of its last line, shortest interval on the path parameter |
+//! | each of its edges | side and path at its lower end, side and path at its upper end; sorted by the first |
 //!
 //! A place on a parameter is an i32: the span in the upper bits, the fraction in the lower [`FRACTION_BITS`]. Edges of constant side are left out. A line meets an
 //! edge where lower end <= line < upper end, so that one through a vertex meets one of two edges that pass on and none or both of two that turn back. Between the
@@ -18,9 +18,7 @@ use crate::sample::SpanParameter;
 /// Bits of the fraction of a place.
 pub const FRACTION_BITS: u32 = 21;
 const FRACTION_MASK: i32 = (1 << FRACTION_BITS) - 1;
-/// Words before the edges, and of an edge.
-pub const HEAD_WORDS: usize = 3;
-/// Words of an edge.
+/// Words of an edge, and of the head of a cell.
 pub const EDGE_WORDS: usize = 4;
 /// Most edges that a line may meet; half as many intervals.
 pub const CROSSINGS_MAX: usize = 32;
@@ -168,44 +166,79 @@ pub(crate) const fn place_of(at: SpanParameter) -> i32 {
     }
 }
 
-/// The words of a region.
+/// The words of a region: cells, each of a head and edges.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RegionWords<'a> {
-    head: [i32; HEAD_WORDS],
-    edges: &'a [[i32; EDGE_WORDS]],
+    records: &'a [[i32; EDGE_WORDS]],
 }
 
 impl<'a> RegionWords<'a> {
-    /// None where they are not complete.
-    pub(crate) fn new(words: &'a [i32]) -> Option<Self> {
-        let (head, rest) = words.split_first_chunk::<HEAD_WORDS>()?;
-        Some(Self {
-            head: *head,
-            edges: rest.as_chunks().0,
-        })
+    pub(crate) const fn new(words: &'a [i32]) -> Self {
+        Self {
+            records: words.as_chunks().0,
+        }
     }
 
+    /// The cell whose head is this record; `None` behind the last one.
+    pub(crate) fn cell(&self, at: u16) -> Option<CellWords<'a>> {
+        let (head, rest) = self.records.get(usize::from(at)..)?.split_first()?;
+        let [count, ..] = *head;
+        Some(CellWords {
+            at,
+            head: *head,
+            edges: rest.get(..usize::try_from(count).ok()?)?,
+        })
+    }
+}
+
+/// The words of a cell.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct CellWords<'a> {
+    at: u16,
+    head: [i32; EDGE_WORDS],
+    edges: &'a [[i32; EDGE_WORDS]],
+}
+
+impl CellWords<'_> {
     /// Side of the first line.
     pub(crate) const fn first(&self) -> i32 {
-        let [first, _, _] = self.head;
+        let [_, first, _, _] = self.head;
         first
     }
 
     /// Side of the last line.
     pub(crate) const fn last(&self) -> i32 {
-        let [_, last, _] = self.head;
+        let [_, _, last, _] = self.head;
         last
     }
 
     /// Shortest interval.
     pub(crate) const fn least(&self) -> i32 {
-        let [_, _, least] = self.head;
+        let [_, _, _, least] = self.head;
         least
+    }
+
+    /// Head of the next cell.
+    #[allow(
+        clippy::cast_possible_truncation,
+        reason = "a region has fewer than 2^16 records"
+    )]
+    pub(crate) const fn next(&self) -> u16 {
+        self.at.saturating_add(1).saturating_add(self.edges.len() as u16)
     }
 
     /// An edge by its number.
     pub(crate) fn edge(&self, index: u16) -> Option<Edge> {
         self.edges.get(usize::from(index)).copied().map(Edge::from_words)
+    }
+
+    /// Whether its lines are in order and on the surface, and the shortest interval has a length.
+    fn is_sound(&self, header: &Header) -> bool {
+        !self.edges.is_empty()
+            && self.least() > 0
+            && 0 <= self.first()
+            && self.first() <= self.last()
+            && self.last() <= end_of(header.side_spans)
     }
 }
 
@@ -228,7 +261,7 @@ enum Task {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct BadLine;
 
-/// A line of constant side parameter that goes over a region from its first line to its last.
+/// A line of constant side parameter that goes over a cell from its first line to its last.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ScanLine {
     task: Task,
@@ -260,7 +293,7 @@ impl ScanLine {
         joins: [false; 2],
     };
 
-    /// Goes back to the first line of a region: its edges are known from the checks at load.
+    /// Goes back to the first line of the first cell: its edges are known from the checks at load.
     pub(crate) fn restart(&mut self, first: &FirstLine) {
         self.side = first.side;
         self.before = i32::MIN;
@@ -272,10 +305,18 @@ impl ScanLine {
         self.task = Task::Meet(0);
     }
 
+    /// Goes to the first line of another cell.
+    pub(crate) const fn begin(&mut self, side: i32) {
+        self.taken = 0;
+        self.count = 0;
+        self.go_on(side, true);
+        self.before = i32::MIN;
+    }
+
     /// The whole rest of the work on a line whose edges are taken in.
-    pub(crate) fn finish(&mut self, region: &RegionWords<'_>, path_end: i32) -> Result<(), BadLine> {
+    pub(crate) fn finish(&mut self, cell: &CellWords<'_>, path_end: i32) -> Result<(), BadLine> {
         for _ in 0..PORTIONS_MAX {
-            self.work(region, path_end)?;
+            self.work(cell, path_end)?;
         }
         Ok(())
     }
@@ -321,11 +362,11 @@ impl ScanLine {
     }
 
     /// The side at which the region begins again, where the line is above one part of it and below the next.
-    pub(crate) fn begins_again(&self, region: &RegionWords<'_>) -> Option<i32> {
+    pub(crate) fn begins_again(&self, cell: &CellWords<'_>) -> Option<i32> {
         if self.count > 0 {
             return None;
         }
-        let [from, _] = region.edge(self.taken)?.side;
+        let [from, _] = cell.edge(self.taken)?.side;
         Some(from)
     }
 
@@ -334,14 +375,14 @@ impl ScanLine {
     /// # Errors
     /// The line meets too many edges, or an odd number of them.
     #[inline(never)]
-    pub(crate) fn work(&mut self, region: &RegionWords<'_>, path_end: i32) -> Result<(), BadLine> {
+    pub(crate) fn work(&mut self, cell: &CellWords<'_>, path_end: i32) -> Result<(), BadLine> {
         self.task = match self.task {
             Task::Drop => {
-                self.drop_passed(region);
+                self.drop_passed(cell);
                 Task::TakeIn
             }
             Task::TakeIn => {
-                if self.take_in(region)? {
+                if self.take_in(cell)? {
                     Task::TakeIn
                 } else {
                     Task::Meet(0)
@@ -351,7 +392,7 @@ impl ScanLine {
                 let end = index.saturating_add(MET).min(self.count);
                 for index in index..end {
                     let number = self.active.get(usize::from(index)).copied().unwrap_or(0);
-                    if let Some(edge) = region.edge(number) {
+                    if let Some(edge) = cell.edge(number) {
                         self.meet(&edge, path_end);
                     }
                 }
@@ -362,7 +403,7 @@ impl ScanLine {
                 }
             }
             Task::Keep => {
-                self.keep(region.least())?;
+                self.keep(cell.least())?;
                 Task::Done
             }
             Task::Done => Task::Done,
@@ -371,11 +412,11 @@ impl ScanLine {
     }
 
     /// Drops the edges that the line does not meet any more.
-    fn drop_passed(&mut self, region: &RegionWords<'_>) {
+    fn drop_passed(&mut self, cell: &CellWords<'_>) {
         let mut kept = 0_u8;
         for index in 0..self.count {
             let number = self.active.get(usize::from(index)).copied().unwrap_or(0);
-            let is_met = region.edge(number).is_some_and(|edge| edge.meets(self.side));
+            let is_met = cell.edge(number).is_some_and(|edge| edge.meets(self.side));
             if is_met && let Some(place) = self.active.get_mut(usize::from(kept)) {
                 *place = number;
                 kept += 1;
@@ -385,9 +426,9 @@ impl ScanLine {
     }
 
     /// Takes in a portion of edges; returns whether more of them may be due.
-    fn take_in(&mut self, region: &RegionWords<'_>) -> Result<bool, BadLine> {
+    fn take_in(&mut self, cell: &CellWords<'_>) -> Result<bool, BadLine> {
         for _ in 0..TAKEN {
-            let Some(edge) = region.edge(self.taken) else {
+            let Some(edge) = cell.edge(self.taken) else {
                 return Ok(false);
             };
             let [from, _] = edge.side;
@@ -464,7 +505,7 @@ impl ScanLine {
     }
 }
 
-/// The first line of a region: its side, the edges up to there, and those that it meets.
+/// The first line of the first cell: its side, the edges up to there, and those that it meets.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FirstLine {
     side: i32,
@@ -473,10 +514,12 @@ pub(crate) struct FirstLine {
     active: [u16; CROSSINGS_MAX],
 }
 
-/// The checks of a region at load, edge after edge. They find the first line on the way.
+/// The checks of a region at load, record after record. They find the first line on the way.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RegionCheck {
     first: FirstLine,
+    /// Head of the cell that is checked.
+    cell: u16,
     /// Lower end of the last edge.
     before: i32,
     /// Combination of all ends that is 0 where each occurs an even number of times.
@@ -484,7 +527,7 @@ pub(crate) struct RegionCheck {
 }
 
 impl RegionCheck {
-    /// Before the first edge.
+    /// Before the first record.
     pub(crate) const START: Self = Self {
         first: FirstLine {
             side: 0,
@@ -492,23 +535,23 @@ impl RegionCheck {
             count: 0,
             active: [0; CROSSINGS_MAX],
         },
+        cell: 0,
         before: 0,
         parity: 0,
     };
 
-    /// The first line, once every edge is checked.
+    /// The first line, once every record is checked.
     pub(crate) const fn first_line(&self) -> &FirstLine {
         &self.first
     }
 
-    /// Begins with the first edge.
-    pub(crate) const fn begin(&mut self, region: &RegionWords<'_>) {
+    /// Begins with the first record.
+    pub(crate) const fn begin(&mut self) {
         *self = Self::START;
-        self.first.side = region.first();
     }
 
-    /// Checks a portion of edges, and after the last of them, on a line that is free, the first line. Whether they are sound: on the surface, upwards, in order,
-    /// closed.
+    /// Checks a portion of records, and after the last of them, on a line that is free, the first line. Whether they are sound: edges on the surface, upwards, in order,
+    /// closed in each cell; cells up to the last record.
     pub(crate) fn check(
         &mut self,
         header: &Header,
@@ -517,41 +560,73 @@ impl RegionCheck {
         line: &mut ScanLine,
     ) -> bool {
         let from = portion.saturating_mul(EDGES_A_RECORD);
-        for index in from..from.saturating_add(EDGES_A_RECORD) {
-            let Some((number, edge)) = u16::try_from(index)
-                .ok()
-                .and_then(|number| region.edge(number).map(|edge| (number, edge)))
-            else {
-                break;
-            };
-            let [lower, upper] = edge.side;
-            if !edge.is_sound(header) || lower < self.before {
+        let Some(mut cell) = region.cell(self.cell) else {
+            return false;
+        };
+        for index in from..from.saturating_add(EDGES_A_RECORD).min(header.edges.into()) {
+            let Ok(index) = u16::try_from(index) else {
                 return false;
-            }
-            self.before = lower;
-            self.parity ^= mixed(lower) ^ mixed(upper);
-            let first = &mut self.first;
-            if lower <= first.side {
-                first.taken = number.saturating_add(1);
-                if edge.meets(first.side) {
-                    let Some(place) = first.active.get_mut(usize::from(first.count)) else {
-                        return false;
-                    };
-                    *place = number;
-                    first.count += 1;
+            };
+            if index == cell.next() {
+                if self.parity != 0 {
+                    return false;
                 }
+                self.cell = index;
+                self.before = 0;
+                let Some(next) = region.cell(index) else {
+                    return false;
+                };
+                cell = next;
+            }
+            let is_sound = match index.checked_sub(self.cell.saturating_add(1)) {
+                None => self.check_head(header, &cell),
+                Some(number) => cell
+                    .edge(number)
+                    .is_some_and(|edge| self.check_edge(header, &edge, number)),
+            };
+            if !is_sound {
+                return false;
             }
         }
         if from + EDGES_A_RECORD < u32::from(header.edges) {
             return true;
         }
+        let Some(first) = region.cell(0) else {
+            return false;
+        };
         line.restart(&self.first);
-        line.finish(region, end_of(header.path_spans)).is_ok()
+        line.finish(&first, end_of(header.path_spans)).is_ok()
             && line.intervals() > 0
             && self.parity == 0
-            && region.least() > 0
-            && region.first() <= region.last()
-            && region.last() <= end_of(header.side_spans)
+            && cell.next() == header.edges
+    }
+
+    fn check_head(&mut self, header: &Header, cell: &CellWords<'_>) -> bool {
+        if self.cell == 0 {
+            self.first.side = cell.first();
+        }
+        cell.is_sound(header)
+    }
+
+    fn check_edge(&mut self, header: &Header, edge: &Edge, number: u16) -> bool {
+        let [lower, upper] = edge.side;
+        if !edge.is_sound(header) || lower < self.before {
+            return false;
+        }
+        self.before = lower;
+        self.parity ^= mixed(lower) ^ mixed(upper);
+        let first = &mut self.first;
+        if self.cell == 0 && lower <= first.side {
+            first.taken = number.saturating_add(1);
+            if edge.meets(first.side) {
+                let Some(place) = first.active.get_mut(usize::from(first.count)) else {
+                    return false;
+                };
+                *place = number;
+                first.count += 1;
+            }
+        }
+        true
     }
 }
 

@@ -1,12 +1,12 @@
 //! The passes of a job with a region: its intervals on one line after the other.
 //!
 //! The first line is known since the job was loaded. From there the next one is sought in portions of the planning, once the step-over is known: lines that meet no
-//! interval long enough are skipped by the same step, and where the line meets no edge at all, it goes on where the region begins again. The last line is the
-//! last one that meets an interval.
+//! interval long enough are skipped by the same step, and where the line meets no edge at all, it goes on where the cell begins again. The last line is the
+//! last one that meets an interval; after it the next cell begins, at a first line of its own.
 
 use crate::fault::{Fault, FaultKind, Result};
 use crate::job::program::Job;
-use crate::job::region::{FirstLine, ScanLine, end_of, place_from, place_of, place_to};
+use crate::job::region::{CellWords, FirstLine, ScanLine, end_of, place_from, place_of, place_to};
 use crate::job::{Header, Pattern};
 use crate::pass::route::Route;
 use crate::pass::schedule;
@@ -33,6 +33,8 @@ pub(crate) struct RegionLines {
     reversed: bool,
     /// Intervals of the line that were passes already.
     done: u8,
+    /// Head of the cell.
+    cell: u16,
     /// A further line is sought.
     is_seeking: bool,
     /// The job has a region.
@@ -47,6 +49,7 @@ impl RegionLines {
         line: ScanLine::START,
         reversed: false,
         done: 0,
+        cell: 0,
         is_seeking: false,
         is_in_use: false,
         step: 0.0,
@@ -57,12 +60,18 @@ impl RegionLines {
         self.is_in_use = false;
         self.reversed = false;
         self.done = 0;
+        self.cell = 0;
         self.is_seeking = false;
-        if let Some(region) = job.region() {
+        if let Some(cell) = self.cell(job) {
             self.line.restart(first);
             // It was checked at load.
-            self.is_in_use = self.line.finish(&region, end_of(job.header.path_spans)).is_ok();
+            self.is_in_use = self.line.finish(&cell, end_of(job.header.path_spans)).is_ok();
         }
+    }
+
+    /// The words of the cell.
+    fn cell<'a>(&self, job: &Job<'a>) -> Option<CellWords<'a>> {
+        job.region()?.cell(self.cell)
     }
 
     /// The line, for the checks of a job that is loaded.
@@ -132,16 +141,16 @@ impl RegionLines {
         self.next_line(job, false)
     }
 
-    /// Moves the line by the step; false after the last line.
+    /// Moves the line by the step, or to the next cell; false after the last line of the last one.
     fn next_line(&mut self, job: &Job<'_>, skips: bool) -> Result<bool> {
-        let Some(region) = job.region() else {
+        let Some(cell) = self.cell(job) else {
             return Ok(false);
         };
         let side = self.line.side();
-        if side >= region.last() {
-            return Ok(false);
+        if side >= cell.last() {
+            return Ok(self.next_cell(job, &cell));
         }
-        let next = match self.line.begins_again(&region) {
+        let next = match self.line.begins_again(&cell) {
             Some(next) => next.max(side + 1),
             None => {
                 let width = |span| job.side_width(span);
@@ -152,8 +161,19 @@ impl RegionLines {
         if next <= side {
             return Err(Fault::new(FaultKind::IntervalTooSmall, self.step));
         }
-        self.line.go_on(next.min(region.last()), skips);
+        self.line.go_on(next.min(cell.last()), skips);
         Ok(true)
+    }
+
+    /// Goes to the first line of the next cell; false after the last one.
+    fn next_cell(&mut self, job: &Job<'_>, cell: &CellWords<'_>) -> bool {
+        let next = cell.next();
+        let Some(cell) = job.region().and_then(|region| region.cell(next)) else {
+            return false;
+        };
+        self.cell = next;
+        self.line.begin(cell.first());
+        true
     }
 
     /// One portion of the search for the next pass.
@@ -165,14 +185,14 @@ impl RegionLines {
         if self.has_more() {
             return Ok(NextPass::Found);
         }
-        let Some(region) = job.region() else {
+        let Some(cell) = self.cell(job) else {
             return Ok(NextPass::None);
         };
         if !self.is_seeking {
             return Ok(NextPass::None);
         }
         if !self.line.is_done() {
-            let worked = self.line.work(&region, end_of(job.header.path_spans));
+            let worked = self.line.work(&cell, end_of(job.header.path_spans));
             if worked.is_err() {
                 let pass = crate::math::arith::count_to_f32(pass);
                 return Err(Fault::new(FaultKind::BadPatch, pass));

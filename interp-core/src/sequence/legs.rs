@@ -2,7 +2,8 @@
 
 use crate::fault::{Fault, Result};
 use crate::job::AxisLimits;
-use crate::job::program::{Job, Link};
+use crate::job::links::Link;
+use crate::job::program::Job;
 use crate::math::number::Bounded;
 use crate::pass::run::Run;
 use crate::sample::Sample;
@@ -94,16 +95,20 @@ impl Sequencer {
             Goal::SafeHeight | Goal::Lift => from,
             Goal::Back => self.back.at,
         };
-        let height_nm = match self.goal {
-            // A straight link that could not begin in time goes at the safe height.
-            Goal::Pass if self.on_surface => match job.link_to(now.pass.wrapping_add(1), axes) {
-                Link::Across(height_nm) => height_nm,
-                Link::Straight => axes.safe_z_nm,
-            },
-            _ => axes.safe_z_nm,
+        let link = match self.goal {
+            Goal::Pass if self.on_surface => job.link_to(now.pass.wrapping_add(1), axes),
+            _ => Link::Across(axes.safe_z_nm),
         };
-        let height = from[2].max(height_nm);
+        // A low link that could not begin in time goes at the safe height.
+        let height = match link {
+            Link::Across(height_nm) => from[2].max(height_nm),
+            _ => from[2].max(axes.safe_z_nm),
+        };
         let to = match leg {
+            Leg::Traverse if self.is_low => match link {
+                Link::Around(detour) => detour.place([from, [x, y, z]]),
+                _ => [x, y, z],
+            },
             Leg::Retract => [from[0], from[1], height],
             Leg::Traverse => [x, y, from[2]],
             Leg::Plunge => [x, y, z],
@@ -113,7 +118,7 @@ impl Sequencer {
         }
         check_travel(axes, &to)?;
         let comes_down = (is_approach || self.goal == Goal::Back) && leg == Leg::Plunge;
-        let slow_mm = if is_approach && self.is_straight {
+        let slow_mm = if is_approach && self.is_low {
             f32::MAX
         } else if comes_down {
             axes.plunge_mm

@@ -52,7 +52,7 @@ impl Sequencer {
             };
         }
         // From above it goes across and down.
-        self.is_straight = false;
+        self.is_low = false;
         self.goal = Goal::Lift;
         self.await_goal(Leg::Retract);
         true

@@ -18,15 +18,15 @@ const POLE_SHARE: f64 = 1e-9;
 
 /// A point and its first derivatives.
 #[derive(Default)]
-pub(super) struct Frame {
-    pub(super) point: DVec3,
-    pub(super) u: DVec3,
-    pub(super) v: DVec3,
+pub(crate) struct Frame {
+    pub(crate) point: DVec3,
+    pub(crate) u: DVec3,
+    pub(crate) v: DVec3,
 }
 
 /// A surface in a form for evaluation.
 #[allow(clippy::large_enum_variant, reason = "one per job")]
-pub(super) enum SurfaceEvaluator {
+pub(crate) enum SurfaceEvaluator {
     Pieces { source: Source, breaks: [Vec<f64>; 2] },
     Profile { radius: [f64; 4], height: [f64; 4] },
 }
@@ -56,7 +56,7 @@ fn span(breaks: &[f64], at: f64) -> [f64; 2] {
 }
 
 impl SurfaceEvaluator {
-    pub(super) fn new(spec: &SurfaceSpec) -> Self {
+    pub(crate) fn new(spec: &SurfaceSpec) -> Self {
         match spec {
             SurfaceSpec::Revolved {
                 radius_mm, height_mm, ..
@@ -72,7 +72,7 @@ impl SurfaceEvaluator {
         }
     }
 
-    pub(super) fn at(&self, u: f64, v: f64) -> Frame {
+    pub(crate) fn at(&self, u: f64, v: f64) -> Frame {
         match self {
             Self::Profile { radius, height } => {
                 let ([r, dr], [z, dz]) = (cubic(*radius, u), cubic(*height, u));

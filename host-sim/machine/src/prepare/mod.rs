@@ -19,6 +19,7 @@ use interp_core::{Header, Pattern, Spacing, StepConfig, SurfaceKind, ToolSide, e
 use job::{Along, AlongChoice, Job, JobError, StartChoice, SurfaceSpec};
 use patches::pieces::Source;
 
+pub(crate) use geometry::SurfaceEvaluator;
 pub use grid::patch_count;
 pub use steps::{config as step_config, configuration};
 pub use stream::{PATCHES_MAX, streamed};

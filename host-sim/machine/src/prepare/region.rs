@@ -1,10 +1,10 @@
 //! The region of a job as edges in the machine's store.
 //!
 //! Vertices are rounded to places of the path and the side parameter, 2^-21 of a span. The first and the last line are the first and the last that meet an interval
-//! that is long enough, so the machine finds a pass on both.
+//! that is long enough, so the machine finds a pass on both. A cell that holds no pass is left out.
 
 use interp_core::STORE_WORDS;
-use interp_core::job::region::{CROSSINGS_MAX, Edge, FRACTION_BITS, REGION_SPANS_MAX};
+use interp_core::job::region::{CROSSINGS_MAX, EDGE_WORDS, Edge, FRACTION_BITS, REGION_SPANS_MAX};
 use job::{Along, Job, JobError, Region};
 
 use super::geometry::SurfaceEvaluator;
@@ -49,8 +49,43 @@ pub(super) fn add(job: &Job, region: &Region, prepared: &mut Prepared) -> Result
             "use fewer knots, or cut the part into several jobs",
         );
     }
-    let edges = edges(job.along, region, prepared);
-    let words = prepared.words.len() + 3 + 4 * edges.len();
+    let least = least(job, prepared);
+    let mut start = None;
+    let mut records = Vec::new();
+    for part in region.parts() {
+        let edges = edges(job.along, &part, prepared);
+        let (side, most) = most_met(&edges);
+        if most > CROSSINGS_MAX {
+            let name = match job.along {
+                Along::U => "v",
+                Along::V => "u",
+            };
+            return no(
+                format!(
+                    "a pass at {name} = {:.6} meets {most} edges of the region, more than {CROSSINGS_MAX}",
+                    parameter(&prepared.side, side)
+                ),
+                "let the passes run along the other parameter, or cut the region into several jobs",
+            );
+        }
+        let Some([first, last]) = lines(&edges, least) else {
+            continue;
+        };
+        let from = intervals(&edges, first, least)
+            .first()
+            .map_or(0, |[from, _]| *from);
+        start.get_or_insert([from, first]);
+        let count = i32::try_from(edges.len()).unwrap_or(i32::MAX);
+        records.push([count, first, last, least]);
+        records.extend(edges.into_iter().map(Edge::to_words));
+    }
+    let Some([path, side]) = start else {
+        return no(
+            "the region holds no pass: it is narrower than a tenth of the step-over everywhere".to_owned(),
+            "draw a wider region",
+        );
+    };
+    let words = prepared.words.len() + EDGE_WORDS * records.len();
     if words > STORE_WORDS {
         return no(
             format!(
@@ -59,36 +94,9 @@ pub(super) fn add(job: &Job, region: &Region, prepared: &mut Prepared) -> Result
             "simplify the loops, use fewer knots, or cut the part into several jobs",
         );
     }
-    let name = match job.along {
-        Along::U => "v",
-        Along::V => "u",
-    };
-    let (side, most) = most_met(&edges);
-    if most > CROSSINGS_MAX {
-        return no(
-            format!(
-                "a pass at {name} = {:.6} meets {most} edges of the region, more than {CROSSINGS_MAX}",
-                parameter(&prepared.side, side)
-            ),
-            "let the passes run along the other parameter, or cut the region into several jobs",
-        );
-    }
-    let least = least(job, prepared);
-    let Some([first, last]) = lines(&edges, least) else {
-        return no(
-            "the region holds no pass: it is narrower than a tenth of the step-over everywhere".to_owned(),
-            "draw a wider region",
-        );
-    };
-    prepared.header.edges = u16::try_from(edges.len()).unwrap_or(u16::MAX);
-    prepared.words.extend([first, last, least]);
-    prepared
-        .words
-        .extend(edges.iter().flat_map(|edge| edge.to_words()));
-    let start = intervals(&edges, first, least)
-        .first()
-        .map_or(0, |[from, _]| *from);
-    let (path, side) = (parameter(&prepared.path, start), parameter(&prepared.side, first));
+    prepared.header.edges = u16::try_from(records.len()).unwrap_or(u16::MAX);
+    prepared.words.extend(records.into_flattened());
+    let (path, side) = (parameter(&prepared.path, path), parameter(&prepared.side, side));
     Ok(match job.along {
         Along::U => [path, side],
         Along::V => [side, path],

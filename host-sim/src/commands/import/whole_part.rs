@@ -1,128 +1,34 @@
 //! `import --part`: a job for each face of a part that the tool reaches, in order, with a summary and a page.
 
 mod effort;
+mod face;
 mod picture;
 mod program;
+mod setup;
+mod summary;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use clap::ValueEnum;
-use job::{Along, FaceReach, Region, SurfaceSpec};
-use patches::placement::Rotation;
+use job::FaceReach;
 use rayon::prelude::*;
-use serde_json::{Value, json};
 
 use super::super::out::say;
-use super::super::{Failure, Result, progress, region_words, whole};
-use super::{Arguments, relative};
-use cad::{CadError, Face, JobOptions, MachinableFace, Model, Options, Placement, machinable, write_job};
-use effort::effort_s;
-use part::{Part, Request, Tool, placed_part};
+use super::super::{Failure, Result, progress, whole};
+use super::Arguments;
+use cad::{CadError, Face, MachinableFace, Model, Options, machinable};
+use face::{Asked, Outcome, outcome};
+use part::Tool;
 use picture::{cells, page};
 use program::program;
+pub(super) use setup::Up;
+use setup::{Setup, best_side};
+use summary::{Sums, print, summary};
 
 /// Default scallop height, mm, as in a job of a face.
 const SCALLOP_MM: f64 = 0.01;
-/// Default of what is the machine's range: a part that reaches farther is moved to the origin, mm.
-const RANGE_MM: f64 = 2000.0;
 /// How far the surface of a face goes on beyond it, in step-overs: as for a job.
 const STEP_OVERS_AROUND: f64 = job_file::STEP_OVERS_AROUND;
-/// Places a side of a face at which the best side of a part is looked for.
-const LOOKS: usize = 16;
-
-/// The side of the part that looks up on the machine.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(super) enum Up {
-    /// The file's +z.
-    #[value(name = "+z")]
-    PlusZ,
-    /// Its -z.
-    #[value(name = "-z")]
-    MinusZ,
-    /// Its +x.
-    #[value(name = "+x")]
-    PlusX,
-    /// Its -x.
-    #[value(name = "-x")]
-    MinusX,
-    /// Its +y.
-    #[value(name = "+y")]
-    PlusY,
-    /// Its -y.
-    #[value(name = "-y")]
-    MinusY,
-    /// The one of the six of which most can be reached.
-    Auto,
-}
-
-impl Up {
-    const SIX: [Self; 6] = [
-        Self::PlusZ,
-        Self::MinusZ,
-        Self::PlusX,
-        Self::MinusX,
-        Self::PlusY,
-        Self::MinusY,
-    ];
-
-    /// Rotations about x, y and z that turn it up.
-    fn rotate_deg(self) -> [f64; 3] {
-        match self {
-            Self::PlusZ | Self::Auto => [0.0, 0.0, 0.0],
-            Self::MinusZ => [180.0, 0.0, 0.0],
-            Self::PlusX => [0.0, -90.0, 0.0],
-            Self::MinusX => [0.0, 90.0, 0.0],
-            Self::PlusY => [90.0, 0.0, 0.0],
-            Self::MinusY => [-90.0, 0.0, 0.0],
-        }
-    }
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::PlusZ => "+z",
-            Self::MinusZ => "-z",
-            Self::PlusX => "+x",
-            Self::MinusX => "-x",
-            Self::PlusY => "+y",
-            Self::MinusY => "-y",
-            Self::Auto => "auto",
-        }
-    }
-}
-
-/// How a part lies on the machine.
-struct Setup {
-    up: Up,
-    translate_mm: [f64; 3],
-    placement: Placement,
-    part: Arc<Part>,
-    scallop_mm: f64,
-}
-
-impl Setup {
-    fn new(up: Up, model: &Arc<Model>, scallop_mm: f64) -> Self {
-        let linear = Rotation::of_degrees(up.rotate_deg()).0;
-        let rows = |by: [f64; 3]| Placement {
-            rows: std::array::from_fn(|i| [linear[i][0], linear[i][1], linear[i][2], by[i]]),
-        };
-        let placement = rows([0.0; 3]);
-        let mut setup = Self {
-            up,
-            translate_mm: [0.0; 3],
-            placement,
-            part: placed_part(model, &placement),
-            scallop_mm,
-        };
-        let block = setup.part.block();
-        if block.low.abs().max(block.high.abs()).max_element() > RANGE_MM {
-            setup.translate_mm = (-0.5 * (block.low + block.high)).round().to_array();
-            setup.placement = rows(setup.translate_mm);
-            setup.part = placed_part(model, &setup.placement);
-        }
-        setup
-    }
-}
 
 /// Where the jobs go: a file with all of them, or a folder with one for each face.
 struct Output<'a> {
@@ -170,87 +76,6 @@ impl<'a> Output<'a> {
             self.path.join(format!("{place:03}-face-{face}.toml"))
         }
     }
-}
-
-/// What becomes of a face.
-struct Outcome {
-    number: usize,
-    /// Area and reach; `None` if the face is not known.
-    reach: Option<FaceReach>,
-    /// Why it has no job.
-    refused: Option<String>,
-    region: Option<(Region, SurfaceSpec)>,
-    job: Option<PathBuf>,
-    /// Highest z of the region, mm.
-    top_mm: f64,
-    text: String,
-    /// Direction of the passes and side of the tool, as in job files, and the time of the passes about, s.
-    along: &'static str,
-    side: &'static str,
-    passes_s: f64,
-    /// The face in cells, each with its colour; none for a plane, whose regions are exact polygons.
-    cells: Vec<([u8; 3], [[f64; 3]; 4])>,
-}
-
-/// The request for the region of a face with this surface.
-struct Asked<'a> {
-    part: &'a Part,
-    tool: &'a Tool,
-    scallop_mm: f64,
-    setup: &'a Setup,
-}
-
-impl Asked<'_> {
-    /// Something of the request for the region of a face.
-    fn of<T>(&self, face: &Face, made: &MachinableFace, take: impl FnOnce(&Request<'_>) -> T) -> T {
-        let placed = face.placed(&self.setup.placement);
-        let spec = made.spec();
-        let [[u0, u1], [v0, v1]] = spec.domain();
-        let whole = vec![vec![[u0, v0], [u1, v0], [u1, v1], [u0, v1]]];
-        // In the coordinates of the file the surface is placed by its poles.
-        let surface = oracle::Surface::new(&moved(&spec, &self.setup.placement));
-        let request = Request {
-            surface: &surface,
-            trimmed: made.trimmed.as_ref().unwrap_or(&whole),
-            face: placed.as_ref().unwrap_or(face),
-            placement: &Placement::IDENTITY,
-            sign: face.sense,
-            tool: self.tool,
-            scallop_mm: self.scallop_mm,
-            steepest_deg: job_file::STEEPEST_DEG,
-            touch_mm: job_file::PART_TOLERANCE_MM,
-            part: Some((self.part, self.part.index(face.number))),
-        };
-        take(&request)
-    }
-
-    fn reach(&self, face: &Face, made: &MachinableFace, side: usize) -> FaceReach {
-        let found = self.of(face, made, |request| request.reach(side));
-        FaceReach {
-            area_mm2: found.area_mm2,
-            reachable_mm2: found.reachable_mm2,
-            unreachable_mm2: found
-                .unreachable_mm2
-                .iter()
-                .map(|(reason, area)| (reason.name().to_owned(), *area))
-                .collect(),
-            ..FaceReach::default()
-        }
-    }
-}
-
-/// A surface by its poles, transformed.
-fn moved(spec: &SurfaceSpec, by: &Placement) -> SurfaceSpec {
-    let SurfaceSpec::Nurbs(nurbs) = spec else {
-        return spec.clone();
-    };
-    let mut nurbs = nurbs.clone();
-    for pole in nurbs.poles_mm.iter_mut().flatten() {
-        let [x, y, z, weight] = *pole;
-        let [x, y, z] = by.point([x, y, z].into()).to_array();
-        *pole = [x, y, z, weight];
-    }
-    SurfaceSpec::Nurbs(nurbs)
 }
 
 /// Writes a job for each face, the summary and the page.
@@ -343,172 +168,6 @@ pub(super) fn reaches(
     found
 }
 
-/// The side of which most can be reached.
-fn best_side(
-    model: &Arc<Model>,
-    faces: &[&Face],
-    made: &[std::result::Result<MachinableFace, CadError>],
-    tool: &Tool,
-    scallop_mm: f64,
-) -> Setup {
-    let tried = Up::SIX.map(|up| {
-        let setup = Setup::new(up, model, scallop_mm);
-        let asked = Asked {
-            part: &setup.part,
-            tool,
-            scallop_mm,
-            setup: &setup,
-        };
-        let known = faces
-            .iter()
-            .zip(made)
-            .filter_map(|(face, made)| Some((face, made.as_ref().ok()?)));
-        let reached: f64 = known
-            .map(|(face, made)| asked.reach(face, made, LOOKS).reachable_mm2)
-            .sum();
-        (reached, up)
-    });
-    let best = tried.into_iter().fold(
-        (-1.0, Up::PlusZ),
-        |best, one| if one.0 > best.0 { one } else { best },
-    );
-    Setup::new(best.1, model, scallop_mm)
-}
-
-/// What becomes of a face; its job is not written yet.
-fn outcome(
-    arguments: &Arguments,
-    file: &str,
-    face: &Face,
-    made: std::result::Result<&MachinableFace, &CadError>,
-    asked: &Asked<'_>,
-    folder: &Path,
-) -> Outcome {
-    let mut outcome = Outcome {
-        number: face.number,
-        reach: None,
-        refused: None,
-        region: None,
-        job: None,
-        top_mm: f64::NEG_INFINITY,
-        text: String::new(),
-        along: "u",
-        side: if face.sense > 0.0 { "+" } else { "-" },
-        passes_s: 0.0,
-        cells: Vec::new(),
-    };
-    let made = match made {
-        Ok(made) => made,
-        Err(error) => {
-            outcome.refused = Some(error.what.clone());
-            return outcome;
-        }
-    };
-    let reach = asked.reach(face, made, 64);
-    if reach.reachable_mm2 == 0.0 {
-        outcome.reach = Some(reach);
-        return outcome;
-    }
-    outcome.reach = Some(reach);
-    // In the folder: paths are relative to it, and the region is kept there.
-    let path = folder.join("face.toml");
-    let written = write_job(
-        file,
-        face,
-        made,
-        &JobOptions {
-            radius_mm: arguments.radius_mm,
-            feed_mm_min: arguments.feed_mm_min,
-            scallop_mm: Some(asked.scallop_mm),
-            along: Some(
-                arguments
-                    .along
-                    .clone()
-                    .unwrap_or_else(|| outcome.along.to_owned()),
-            ),
-            side: Some(outcome.side.to_owned()),
-            pattern: arguments.pattern.clone(),
-            in_part: true,
-            rotate_deg: asked.setup.up.rotate_deg(),
-            translate_mm: asked.setup.translate_mm,
-            source: relative(&arguments.file, &path).map(|source| (source, arguments.tolerance)),
-        },
-    );
-    let read = written.map_err(|error| error.to_string()).and_then(|written| {
-        let job = job_file::parse_with(&path.display().to_string(), &written.text, &part::Faces);
-        job.map(|job| (job, written.text))
-            .map_err(|error| error.what().to_owned())
-    });
-    match read {
-        Ok((job, text)) => {
-            if let Some(reach) = job.origin.reach() {
-                outcome.reach = Some(reach.clone());
-            }
-            if let Some(region) = job.region {
-                let surface = oracle::Surface::new(&job.surface);
-                let heights = region
-                    .loops
-                    .iter()
-                    .flatten()
-                    .map(|[u, v]| surface.at(*u, *v).point.z);
-                outcome.top_mm = heights.fold(f64::NEG_INFINITY, f64::max);
-                let step_over_mm = (8.0 * job.radius_mm * job.scallop_mm).sqrt();
-                let efforts = [Along::U, Along::V]
-                    .map(|along| effort_s(&surface, &region, along, step_over_mm, job.feed_mm_min / 60.0));
-                outcome.along = if efforts[1] < efforts[0] { "v" } else { "u" };
-                outcome.passes_s = efforts[0].min(efforts[1]);
-                outcome.region = Some((region, job.surface));
-                outcome.text = match &arguments.along {
-                    Some(_) => text,
-                    None => text.replacen("along = \"u\"", &format!("along = \"{}\"", outcome.along), 1),
-                };
-            }
-        }
-        Err(why) => outcome.refused = Some(why),
-    }
-    outcome
-}
-
-/// Sums over all faces, mm2.
-#[derive(Default)]
-struct Sums {
-    area: f64,
-    reachable: f64,
-    region: f64,
-    unreachable: Vec<(String, f64)>,
-    unknown: usize,
-}
-
-impl Sums {
-    fn of(outcomes: &[Outcome]) -> Self {
-        let mut sums = Self::default();
-        for outcome in outcomes {
-            let Some(reach) = &outcome.reach else {
-                sums.unknown += 1;
-                continue;
-            };
-            sums.area += reach.area_mm2;
-            sums.reachable += reach.reachable_mm2;
-            sums.region += if outcome.job.is_some() {
-                reach.region_mm2
-            } else {
-                0.0
-            };
-            for (reason, area) in &reach.unreachable_mm2 {
-                match sums.unreachable.iter_mut().find(|(name, _)| name == reason) {
-                    Some((_, sum)) => *sum += area,
-                    None => sums.unreachable.push((reason.clone(), *area)),
-                }
-            }
-        }
-        sums
-    }
-
-    fn share(part: f64, of: f64) -> f64 {
-        if of > 0.0 { 100.0 * part / of } else { 0.0 }
-    }
-}
-
 /// Writes everything: jobs from the highest to the lowest face.
 fn write(
     arguments: &Arguments,
@@ -556,81 +215,4 @@ fn write(
     }
     print(file, &page_path, setup, &order, &outcomes, &sums);
     Ok(())
-}
-
-fn summary(
-    arguments: &Arguments,
-    file: &str,
-    setup: &Setup,
-    order: &[usize],
-    outcomes: &[Outcome],
-    sums: &Sums,
-    page: &Path,
-) -> Value {
-    let face = |outcome: &Outcome| {
-        json!({
-            "face": outcome.number,
-            "job": outcome.job.as_ref().map(|path| path.display().to_string()),
-            "region": outcome.reach.as_ref().map(region_words::json),
-            "error": outcome.refused,
-        })
-    };
-    json!({
-        "file": file,
-        "up": setup.up.name(),
-        "rotate_deg": setup.up.rotate_deg(),
-        "translate_mm": setup.translate_mm,
-        "radius_mm": arguments.radius_mm,
-        "jobs": order.iter().filter_map(|index| outcomes[*index].job.as_ref()).map(|path| path.display().to_string()).collect::<Vec<_>>(),
-        "page": page.display().to_string(),
-        "area_mm2": sums.area,
-        "reachable_mm2": sums.reachable,
-        "region_mm2": sums.region,
-        "unreachable": sums.unreachable.iter().map(|(reason, area)| json!({ "reason": reason, "area_mm2": area })).collect::<Vec<_>>(),
-        "faces_not_known": sums.unknown,
-        "faces": outcomes.iter().map(face).collect::<Vec<_>>(),
-    })
-}
-
-fn print(file: &str, page: &Path, setup: &Setup, order: &[usize], outcomes: &[Outcome], sums: &Sums) {
-    say!("{file}, {} up", setup.up.name());
-    for index in order {
-        let outcome = &outcomes[*index];
-        let (Some(job), Some(reach)) = (&outcome.job, &outcome.reach) else {
-            continue;
-        };
-        let name = job.file_name().unwrap_or_default().to_string_lossy();
-        say!(
-            "  {name:<24} {:>11.2} of {:>11.2} mm2 ({:>6.2} %)",
-            reach.region_mm2,
-            reach.area_mm2,
-            Sums::share(reach.region_mm2, reach.area_mm2)
-        );
-    }
-    for outcome in outcomes {
-        if let Some(why) = &outcome.refused {
-            say!("  face {} has no job: {why}", outcome.number);
-        }
-    }
-    say!(
-        "  reachable    {:.2} of {:.2} mm2 ({:.2} %) of {} faces; {:.3} % of it in {} jobs",
-        sums.reachable,
-        sums.area,
-        Sums::share(sums.reachable, sums.area),
-        outcomes.len(),
-        Sums::share(sums.region, sums.reachable),
-        order.len()
-    );
-    for (reason, area) in &sums.unreachable {
-        say!("  unreachable  {area:.2} mm2: {}", region_words::reason(reason));
-    }
-    if sums.unknown > 0 {
-        say!("  {} faces are not known", sums.unknown);
-    }
-    let passes_s: f64 = order.iter().map(|index| outcomes[*index].passes_s).sum();
-    say!(
-        "  passes       about {:.1} min; `verify` tells the time",
-        passes_s / 60.0
-    );
-    say!("  page         {}", page.display());
 }

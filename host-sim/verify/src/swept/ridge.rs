@@ -187,6 +187,11 @@ impl<'a> Gap<'a> {
         let mut first = 0;
         for pair in lines.windows(2) {
             let second = first + pair[0].len();
+            // The next cell begins below where the last one ended.
+            if pair[1][0].pass().side < pair[0][0].pass().side {
+                first = second;
+                continue;
+            }
             for (i, near) in pair[0].iter().enumerate() {
                 for (j, far) in pair[1].iter().enumerate() {
                     if let Some(range) = beside(oracle, [near, far]) {

@@ -42,7 +42,7 @@ fn header(path_spans: u16, side_spans: u16, edges: usize) -> Header {
     }
 }
 
-/// The words of a region, with lines from its least side to its greatest.
+/// The words of a region of one cell, with lines from its least side to its greatest.
 fn words(loops: &[Vec<[i32; 2]>], least: i32) -> Vec<i32> {
     let mut edges: Vec<Edge> = Vec::new();
     for points in loops {
@@ -53,13 +53,13 @@ fn words(loops: &[Vec<[i32; 2]>], least: i32) -> Vec<i32> {
     edges.sort();
     let first = edges[0].side[0];
     let last = edges.iter().map(|edge| edge.side[1]).max().unwrap() - 1;
-    let mut words = vec![first, last, least];
+    let mut words = vec![edges.len() as i32, first, last, least];
     words.extend(edges.iter().flat_map(|edge| edge.to_words()));
     words
 }
 
 /// Moves a line to a side; its crossings in pairs.
-fn cross(line: &mut ScanLine, region: &RegionWords<'_>, side: i32, path_end: i32) -> Vec<[i32; 2]> {
+fn cross(line: &mut ScanLine, region: &CellWords<'_>, side: i32, path_end: i32) -> Vec<[i32; 2]> {
     line.go_on(side, false);
     let mut portions = 0;
     while !line.is_done() {
@@ -106,7 +106,7 @@ fn lines_are_cut_as_the_even_odd_rule_says() {
             continue;
         }
         let words = words(&loops, 1);
-        let region = RegionWords::new(&words).unwrap();
+        let region = RegionWords::new(&words).cell(0).unwrap();
         let mut sides: Vec<i32> = loops
             .iter()
             .flatten()
@@ -181,11 +181,14 @@ fn a_region_is_checked_edge_by_edge() {
         [unit / 4, unit / 4],
     ];
     let good = words(&[star, hole], 10);
-    let header = header(2, 1, (good.len() - HEAD_WORDS) / EDGE_WORDS);
+    // A second cell, checked like the first one.
+    let one = good.len();
+    let good = [good.clone(), good].concat();
+    let header = header(2, 1, good.len() / EDGE_WORDS);
     let check = |words: &[i32]| {
-        let region = RegionWords::new(words).unwrap();
+        let region = RegionWords::new(words);
         let mut check = RegionCheck::START;
-        check.begin(&region);
+        check.begin();
         let portions = u32::from(header.edges).div_ceil(EDGES_A_RECORD);
         let mut line = ScanLine::START;
         let is_sound = (0..portions).all(|portion| check.check(&header, &region, portion, &mut line));
@@ -193,7 +196,7 @@ fn a_region_is_checked_edge_by_edge() {
         let mut again = ScanLine::START;
         again.restart(check.first_line());
         is_sound.then(|| {
-            again.finish(&region, end_of(2)).unwrap();
+            again.finish(&region.cell(0).unwrap(), end_of(2)).unwrap();
             assert_eq!(line.interval(0), again.interval(0));
             again
         })
@@ -201,7 +204,8 @@ fn a_region_is_checked_edge_by_edge() {
     let line = check(&good).unwrap();
     assert_eq!(line.interval(0), Some([0, 2 * unit]));
     let mut fresh = ScanLine::START;
-    let region = RegionWords::new(&good).unwrap();
+    let region = RegionWords::new(&good).cell(0).unwrap();
+    assert_eq!(usize::from(region.next()), one / EDGE_WORDS);
     assert_eq!(cross(&mut fresh, &region, 0, end_of(2)), vec![[0, 2 * unit]]);
     // From the first line on both are the same.
     let mut line = line;
@@ -220,25 +224,36 @@ fn a_region_is_checked_edge_by_edge() {
         vec![[0, unit / 4], [unit / 2, 2 * unit]]
     );
     let mut mistakes = 0;
+    let count = good[0];
     for (at, value) in [
-        (0, unit + 1),
+        (0, count + 1),
+        (0, count - 1),
+        (0, 0),
         (0, -1),
         (1, unit + 1),
         (1, -1),
-        (2, 0),
-        (2, 5 * unit),
-        (3, 5),
-        (4, -1),
-        (4, 2 * unit + 1),
-        (5, unit + 1),
-        (5, 7),
+        (2, unit + 1),
+        (2, -1),
+        (3, 0),
+        (3, 5 * unit),
+        (4, 5),
+        (5, -1),
+        (5, 2 * unit + 1),
+        (6, unit + 1),
+        (6, 7),
+        (one - 2, unit / 2 - 1),
+        (one, count + 1),
+        (one, count - 1),
+        (one + 2, unit + 1),
+        (one + 3, 0),
+        (one + 4, 5),
         (good.len() - 2, unit / 2 - 1),
     ] {
         let mut words = good.clone();
         words[at] = value;
         mistakes += usize::from(check(&words).is_none());
     }
-    assert_eq!(mistakes, 12);
+    assert_eq!(mistakes, 22);
 }
 
 /// A line meets at most [`CROSSINGS_MAX`] edges.
@@ -259,18 +274,19 @@ fn a_comb_with_too_many_teeth_is_refused() {
     };
     for (teeth, fits) in [(16, true), (17, false)] {
         let words = comb(teeth);
-        let region = RegionWords::new(&words).unwrap();
+        let region = RegionWords::new(&words);
+        let cell = region.cell(0).unwrap();
         let mut line = ScanLine::START;
         line.go_on(1000, false);
         let mut result = Ok(());
         while result.is_ok() && !line.is_done() {
-            result = line.work(&region, end_of(1));
+            result = line.work(&cell, end_of(1));
         }
         assert_eq!(result.is_ok(), fits);
         assert!(!fits || line.intervals() == 16);
-        let header = header(1, 1, 2 * teeth as usize);
+        let header = header(1, 1, 1 + 2 * teeth as usize);
         let mut check = RegionCheck::START;
-        check.begin(&region);
+        check.begin();
         let portions = u32::from(header.edges).div_ceil(EDGES_A_RECORD);
         let is_sound = (0..portions).all(|portion| check.check(&header, &region, portion, &mut line));
         assert_eq!(is_sound, fits);

@@ -14,6 +14,7 @@ use crate::feed::planner::Planner;
 use crate::feed::profile::Profiles;
 use crate::feed::turn::Turn;
 use crate::job::AxisLimits;
+use crate::job::links::Link;
 use crate::job::program::Job;
 use crate::math::number::Bounded;
 use crate::pass::route::Route;
@@ -101,8 +102,8 @@ pub(crate) struct Sequencer {
     pub(super) second: bool,
     /// Whether the tool has been on a pass since the start.
     pub(super) on_surface: bool,
-    /// The leg to the next pass goes straight there from the end of the last one.
-    pub(super) is_straight: bool,
+    /// The legs to the next pass stay low: straight there from the end of the last one, or by a place beside.
+    pub(super) is_low: bool,
     /// A fault of the next pass, reported when the tool reaches the pass.
     pub(super) pending: Option<Fault>,
     pub(super) follower: Follower,
@@ -160,7 +161,7 @@ impl Sequencer {
         plans: [PassPlan::NONE; 2],
         second: false,
         on_surface: false,
-        is_straight: false,
+        is_low: false,
         pending: None,
         follower: Follower::START,
         pace: Pace::REST,
@@ -205,7 +206,7 @@ impl Sequencer {
         self.phase = Phase::Await;
         self.second = false;
         self.on_surface = false;
-        self.is_straight = false;
+        self.is_low = false;
         self.pending = None;
         self.has_first_patch = true;
         self.has_rows = false;
@@ -288,7 +289,7 @@ impl Sequencer {
     pub(crate) fn retract(&mut self, run: &Run) {
         let is_free = self.is_link() || run.faces_up();
         self.goal = Goal::SafeHeight;
-        self.is_straight = false;
+        self.is_low = false;
         if is_free {
             self.await_goal(Leg::Retract);
         } else {
@@ -383,7 +384,15 @@ impl Sequencer {
             } else {
                 check_faces_up(next.faces_up[0] && (now.faces_up[1] || !self.on_surface))?;
                 self.goal = Goal::Pass;
-                self.await_goal(Leg::Retract);
+                let link = (job.header.axes.as_ref())
+                    .filter(|_| self.on_surface)
+                    .map(|axes| job.link_to(next.pass, axes));
+                self.is_low = link.is_some_and(|link| link.is_low());
+                self.await_goal(match link {
+                    Some(Link::Straight) => Leg::Plunge,
+                    Some(Link::Around(_)) => Leg::Traverse,
+                    _ => Leg::Retract,
+                });
             }
         }
         if let Phase::AwaitGoal(leg) = self.phase {

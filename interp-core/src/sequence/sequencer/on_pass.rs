@@ -6,7 +6,7 @@ use crate::feed::MM_PER_Q10;
 use crate::feed::follow::Follower;
 use crate::feed::limits::MotionLimits;
 use crate::feed::plan::Plan;
-use crate::job::program::{Job, Link};
+use crate::job::program::Job;
 use crate::math::number::{Bounded, to_f32};
 use crate::pass::run::Run;
 use crate::sample::Sample;
@@ -43,7 +43,7 @@ impl Sequencer {
         run.enter_pass(job, now.pass, now.route)?;
         run.begin(now.interval, last)?;
         self.on_surface = true;
-        self.is_straight = false;
+        self.is_low = false;
         self.phase = Phase::Pass;
         self.follower.begin(&now.plan);
         let pace = pace_on(now, command.feed_factor);
@@ -169,11 +169,10 @@ impl Sequencer {
             self.goal = Goal::Pass;
             // Planning never delays the lift: what is not planned yet is waited for above the surface.
             let is_planned = self.pending.is_none() && self.planning == Planning::Complete;
-            let is_straight =
-                (job.header.axes.as_ref()).is_some_and(|axes| job.link_to(next.pass, axes) == Link::Straight);
-            if is_planned && is_straight && next.faces_up[0] {
-                self.is_straight = true;
-                self.await_goal(Leg::Plunge);
+            let is_low = (job.header.axes.as_ref()).is_some_and(|axes| job.link_to(next.pass, axes).is_low());
+            if is_low {
+                // It would take longer to rise to the safe height than to wait.
+                self.phase = Phase::Await;
             } else if is_planned && next.faces_up[0] && self.hop.leads(now.ends[1], next.ends[0]) {
                 self.hop
                     .begin(command.feed_factor.at_most(1.0), job.header.period_s);

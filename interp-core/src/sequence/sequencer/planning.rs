@@ -6,7 +6,8 @@ use crate::feed::MM_PER_Q10;
 use crate::feed::limits::MotionLimits;
 use crate::feed::planner::PORTION_CYCLES;
 use crate::feed::turn::Turn;
-use crate::job::program::{Job, Link, Program};
+use crate::job::links::Link;
+use crate::job::program::{Job, Program};
 use crate::job::{AxisLimits, Pattern};
 use crate::math::arith::count_to_f32;
 use crate::math::number::{Bounded, to_f32};
@@ -342,7 +343,7 @@ impl Sequencer {
                 let is_on_surface = if job.header.spacing.is_constant() {
                     job.header.pattern == Pattern::Zigzag
                 } else {
-                    next.steps_over || job.link_to(next.pass.wrapping_add(1), axes) == Link::Straight
+                    next.steps_over || job.link_to(next.pass.wrapping_add(1), axes).is_low()
                 };
                 let least = if !is_last && is_on_surface {
                     let front = if run.needs_front() {

@@ -6,7 +6,9 @@ use cad::{Face, MachinableFace, Model};
 use part::{Reason, State};
 
 use super::super::page::{PartRow, part_page};
-use super::{Asked, Outcome, Setup, Sums};
+use super::face::{Asked, Outcome};
+use super::setup::Setup;
+use super::summary::Sums;
 
 /// Cells of a picture a side of a face as large as the part, and the least and the most of a face: of a part of few faces, and of many.
 const CELLS: f64 = 80.0;

@@ -1,7 +1,10 @@
 //! The text of a job of many faces.
 
 use super::super::{Arguments, relative};
-use super::{Outcome, Output, Setup, Sums};
+use super::Output;
+use super::face::Outcome;
+use super::setup::Setup;
+use super::summary::Sums;
 
 /// One file with all faces: what they have in common, from the text of the first one, and a section for each.
 pub(super) fn program(

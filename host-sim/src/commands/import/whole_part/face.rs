@@ -1,0 +1,191 @@
+//! A face of a part: its reach, its region, its job.
+
+use std::path::{Path, PathBuf};
+
+use cad::{CadError, Face, JobOptions, MachinableFace, Placement, write_job};
+use job::{Along, FaceReach, Region, SurfaceSpec};
+use part::{Part, Request, Tool};
+
+use super::super::{Arguments, relative};
+use super::effort::effort_s;
+use super::setup::Setup;
+
+/// What becomes of a face.
+pub(super) struct Outcome {
+    pub(super) number: usize,
+    /// Area and reach; `None` if the face is not known.
+    pub(super) reach: Option<FaceReach>,
+    /// Why it has no job.
+    pub(super) refused: Option<String>,
+    pub(super) region: Option<(Region, SurfaceSpec)>,
+    pub(super) job: Option<PathBuf>,
+    /// Highest z of the region, mm.
+    pub(super) top_mm: f64,
+    pub(super) text: String,
+    /// Direction of the passes and side of the tool, as in job files, and the time of the passes about, s.
+    pub(super) along: &'static str,
+    pub(super) side: &'static str,
+    pub(super) passes_s: f64,
+    /// The face in cells, each with its colour; none for a plane, whose regions are exact polygons.
+    pub(super) cells: Vec<([u8; 3], [[f64; 3]; 4])>,
+}
+
+/// The request for the region of a face with this surface.
+pub(super) struct Asked<'a> {
+    pub(super) part: &'a Part,
+    pub(super) tool: &'a Tool,
+    pub(super) scallop_mm: f64,
+    pub(super) setup: &'a Setup,
+}
+
+impl Asked<'_> {
+    /// Something of the request for the region of a face.
+    pub(super) fn of<T>(
+        &self,
+        face: &Face,
+        made: &MachinableFace,
+        take: impl FnOnce(&Request<'_>) -> T,
+    ) -> T {
+        let placed = face.placed(&self.setup.placement);
+        let spec = made.spec();
+        let [[u0, u1], [v0, v1]] = spec.domain();
+        let whole = vec![vec![[u0, v0], [u1, v0], [u1, v1], [u0, v1]]];
+        // In the coordinates of the file the surface is placed by its poles.
+        let surface = oracle::Surface::new(&moved(&spec, &self.setup.placement));
+        let request = Request {
+            surface: &surface,
+            trimmed: made.trimmed.as_ref().unwrap_or(&whole),
+            face: placed.as_ref().unwrap_or(face),
+            placement: &Placement::IDENTITY,
+            sign: face.sense,
+            tool: self.tool,
+            scallop_mm: self.scallop_mm,
+            steepest_deg: job_file::STEEPEST_DEG,
+            touch_mm: job_file::PART_TOLERANCE_MM,
+            part: Some((self.part, self.part.index(face.number))),
+        };
+        take(&request)
+    }
+
+    pub(super) fn reach(&self, face: &Face, made: &MachinableFace, side: usize) -> FaceReach {
+        let found = self.of(face, made, |request| request.reach(side));
+        FaceReach {
+            area_mm2: found.area_mm2,
+            reachable_mm2: found.reachable_mm2,
+            unreachable_mm2: found
+                .unreachable_mm2
+                .iter()
+                .map(|(reason, area)| (reason.name().to_owned(), *area))
+                .collect(),
+            ..FaceReach::default()
+        }
+    }
+}
+
+/// A surface by its poles, transformed.
+pub(super) fn moved(spec: &SurfaceSpec, by: &Placement) -> SurfaceSpec {
+    let SurfaceSpec::Nurbs(nurbs) = spec else {
+        return spec.clone();
+    };
+    let mut nurbs = nurbs.clone();
+    for pole in nurbs.poles_mm.iter_mut().flatten() {
+        let [x, y, z, weight] = *pole;
+        let [x, y, z] = by.point([x, y, z].into()).to_array();
+        *pole = [x, y, z, weight];
+    }
+    SurfaceSpec::Nurbs(nurbs)
+}
+
+/// What becomes of a face; its job is not written yet.
+pub(super) fn outcome(
+    arguments: &Arguments,
+    file: &str,
+    face: &Face,
+    made: std::result::Result<&MachinableFace, &CadError>,
+    asked: &Asked<'_>,
+    folder: &Path,
+) -> Outcome {
+    let mut outcome = Outcome {
+        number: face.number,
+        reach: None,
+        refused: None,
+        region: None,
+        job: None,
+        top_mm: f64::NEG_INFINITY,
+        text: String::new(),
+        along: "u",
+        side: if face.sense > 0.0 { "+" } else { "-" },
+        passes_s: 0.0,
+        cells: Vec::new(),
+    };
+    let made = match made {
+        Ok(made) => made,
+        Err(error) => {
+            outcome.refused = Some(error.what.clone());
+            return outcome;
+        }
+    };
+    let reach = asked.reach(face, made, 64);
+    if reach.reachable_mm2 == 0.0 {
+        outcome.reach = Some(reach);
+        return outcome;
+    }
+    outcome.reach = Some(reach);
+    // In the folder: paths are relative to it, and the region is kept there.
+    let path = folder.join("face.toml");
+    let written = write_job(
+        file,
+        face,
+        made,
+        &JobOptions {
+            radius_mm: arguments.radius_mm,
+            feed_mm_min: arguments.feed_mm_min,
+            scallop_mm: Some(asked.scallop_mm),
+            along: Some(
+                arguments
+                    .along
+                    .clone()
+                    .unwrap_or_else(|| outcome.along.to_owned()),
+            ),
+            side: Some(outcome.side.to_owned()),
+            pattern: arguments.pattern.clone(),
+            in_part: true,
+            rotate_deg: asked.setup.up.rotate_deg(),
+            translate_mm: asked.setup.translate_mm,
+            source: relative(&arguments.file, &path).map(|source| (source, arguments.tolerance)),
+        },
+    );
+    let read = written.map_err(|error| error.to_string()).and_then(|written| {
+        let job = job_file::parse_with(&path.display().to_string(), &written.text, &part::Faces);
+        job.map(|job| (job, written.text))
+            .map_err(|error| error.what().to_owned())
+    });
+    match read {
+        Ok((job, text)) => {
+            if let Some(reach) = job.origin.reach() {
+                outcome.reach = Some(reach.clone());
+            }
+            if let Some(region) = job.region {
+                let surface = oracle::Surface::new(&job.surface);
+                let heights = region
+                    .loops
+                    .iter()
+                    .flatten()
+                    .map(|[u, v]| surface.at(*u, *v).point.z);
+                outcome.top_mm = heights.fold(f64::NEG_INFINITY, f64::max);
+                let step_over_mm = (8.0 * job.radius_mm * job.scallop_mm).sqrt();
+                let efforts = [Along::U, Along::V]
+                    .map(|along| effort_s(&surface, &region, along, step_over_mm, job.feed_mm_min / 60.0));
+                outcome.along = if efforts[1] < efforts[0] { "v" } else { "u" };
+                outcome.passes_s = efforts[0].min(efforts[1]);
+                outcome.region = Some((region, job.surface));
+                outcome.text = match &arguments.along {
+                    Some(_) => text,
+                    None => text.replacen("along = \"u\"", &format!("along = \"{}\"", outcome.along), 1),
+                };
+            }
+        }
+        Err(why) => outcome.refused = Some(why),
+    }
+    outcome
+}
