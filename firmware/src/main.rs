@@ -265,7 +265,8 @@ mod app {
             journal,
         };
         transmitter.listen();
-        let mut link = Link::new();
+        // A constant is copied to where it is kept; of a call's result LLVM may keep a second one, 4 KB, on the stack.
+        let mut link = const { Link::new() };
         link.power_up(&mut machine);
         let mut watch = Watch::default();
         let mut last_event = None;

@@ -309,6 +309,8 @@ struct Motion {
     sequencer: Sequencer,
     /// The last tick waited for rows of a streamed job.
     is_starved: bool,
+    /// The first pass was begun at load, and no run has started since.
+    is_begun: bool,
 }
 
 /// Remaining motion of an aborted run.
@@ -335,6 +337,7 @@ impl Motion {
         program: Program::new(),
         sequencer: Sequencer::START,
         is_starved: false,
+        is_begun: false,
     };
 
     fn may_load(&self) -> Result<()> {
@@ -366,7 +369,7 @@ impl Motion {
         self.state = State::Ready;
         self.restart(store);
         if let Ok(job) = self.program.job(store) {
-            self.run.prepare_start(&job);
+            self.is_begun = self.run.prepare_start(&job);
         }
         Ok(())
     }
@@ -485,8 +488,13 @@ impl Motion {
         } = self;
         if program.header().axes.is_some() {
             sequencer.plan(program, store, run);
-        } else if let Ok((job, rest)) = program.job_and_rest(store) {
+            return;
+        }
+        if let Ok((job, rest)) = program.job_and_rest(store) {
             run.plan(&job, rest);
+        }
+        if let Ok(job) = program.job(store) {
+            run.prepare_front(&job);
         }
     }
 
@@ -611,7 +619,9 @@ impl Motion {
         let has_limits = self.program.header().axes.is_some();
         self.state = match command {
             Command::Start => {
-                self.restart(store);
+                if !core::mem::take(&mut self.is_begun) {
+                    self.restart(store);
+                }
                 if let Err(fault) = self.program.rewind() {
                     return self.fail(fault);
                 }

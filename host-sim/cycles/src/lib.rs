@@ -48,8 +48,18 @@ pub const SURFACES: [(&str, &str); 6] = [
 /// slowly.
 pub const TICKS_WITHIN_LIMITS: u32 = 10_000;
 
-/// Further jobs, of `tests/golden`, with their ticks: step rates and limits, which are independent of the kind of surface.
-pub const FURTHER: [(&str, &str, u32); 4] = [
+/// Ticks of a job of constant scallop height: the first pass, which is straight, and some curved ones.
+pub const TICKS_ON_CURVES: u32 = 8_000;
+
+/// Further jobs, of `tests/golden`, with their ticks: curved passes; step rates and limits, which are independent of the kind of surface.
+pub const FURTHER: [(&str, &str, u32); 7] = [
+    ("constant height, bicubic", "constant_bicubic", TICKS_ON_CURVES),
+    ("constant height, rational", "constant_rational", TICKS_ON_CURVES),
+    (
+        "constant height, rational, pole",
+        "constant_pole",
+        TICKS_ON_CURVES,
+    ),
     ("three axes at 400 kHz", "pulses", TICKS),
     ("limits, zig", "limits_zig", TICKS_WITHIN_LIMITS),
     ("limits, zigzag", "limits_zigzag", TICKS_WITHIN_LIMITS),

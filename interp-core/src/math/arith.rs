@@ -115,6 +115,36 @@ pub(crate) fn add_product(sum: i64, a: i32, b: i32) -> i64 {
     sum.wrapping_add(a as i64 * b as i64)
 }
 
+/// `a b / 2^by`, rounded down; `by` is between 1 and 31. On two words, because a shift of 64 bits by a variable takes twice as long.
+#[inline(always)]
+#[must_use]
+pub(crate) fn product_shifted(a: i32, b: i32, by: u32) -> i64 {
+    let product = a as i64 * b as i64;
+    let (high, low) = ((product >> 32) as i32, product as u32);
+    let low = low.wrapping_shr(by) | (high as u32).wrapping_shl(32 - by);
+    (high.wrapping_shr(by) as i64) << 32 | low as i64
+}
+
+/// The place of a fraction (units of 2^-64) on one of 2^bits even parts, units of 2^-31; at most 31 bits.
+#[inline(always)]
+#[must_use]
+pub(crate) fn place_on_part(fraction: u64, bits: u32) -> i32 {
+    let (high, low) = ((fraction >> 32) as u32, fraction as u32);
+    let place = high.wrapping_shl(bits) | (low >> 1).wrapping_shr(31 - bits);
+    (place >> 1) as i32
+}
+
+/// A fraction in units of 2^-32: 0 below, and the greatest from 1 on.
+#[inline(always)]
+#[must_use]
+pub(crate) fn saturated_32(value: i64) -> u32 {
+    match (value >> 32) as i32 {
+        0 => value as u32,
+        high if high < 0 => 0,
+        _ => u32::MAX,
+    }
+}
+
 /// A value in units of 2^-30, rounded down to an integer, and an overflow check: the upper two bits of the second result are zero if the integer fits.
 #[inline(always)]
 #[must_use]

@@ -1,27 +1,48 @@
 //! Double buffer of patches: the run's current patch, and the next one along the pass.
 //!
-//! A tick that crosses a boundary needs the next patch collapsed, and the parametrisation at the boundary on both sides. Neither
-//! depends on the exact end of the previous tick, so both are prepared ahead, in ticks with little other work: one
+//! A tick that crosses a boundary needs the next piece of the pass, its patch collapsed, and the parametrisation at the boundary on both sides. None of them
+//! depends on the exact end of the previous tick, so all are prepared ahead, in ticks with little other work: one
 //! [`Task`] per tick. A tick that reaches a boundary sooner executes the missing tasks itself.
+//!
+//! At a station of a front the patch stays the same: the next piece is another curve on it ([`Ahead::Station`]).
 
 use crate::fault::Result;
 use crate::job::program::Job;
-use crate::pass::patch::Patch;
+use crate::pass::patch::{OnFront, Patch};
 use crate::pass::route::{Piece, Route};
 
 /// The next task, in this order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Task {
-    /// Find the parametrisation at the ends of the current patch.
-    Ends,
-    /// Collapse the next patch.
+    /// Find the next piece of the pass.
+    Next,
+    /// Collapse its patch, or make its curve.
     Ahead,
-    /// Find the parametrisation at the next patch's ends.
-    AheadEnds,
+    /// Find the jump to its curve, on the same patch.
+    Jump,
+    /// Find the parametrisation at its start.
+    Start,
+    /// Find its change over the first period, on a front.
+    Change,
+    /// Find the parametrisation at the end of the current patch.
+    End,
     /// All tasks are complete.
     Done,
-    /// The next patch is not prepared, because it is faulty, which the tick that reaches it reports, or because there is none.
+    /// The next patch is not prepared, because it is faulty, which the tick that reaches it reports.
     Faulty,
+}
+
+/// What is known of the piece after the current one.
+#[derive(Clone, Copy, Debug)]
+enum Ahead {
+    /// Nothing yet.
+    Unknown,
+    /// There is none: the pass ends with the current one.
+    None,
+    /// It is on another patch, which is collapsed if that is true.
+    Patch(Piece, bool),
+    /// It is another curve on the same patch. With the jump there of the derivative of the logarithmic speed derivative, once that is known.
+    Station(Piece, OnFront, Option<f32>),
 }
 
 /// Two patches, one of them current.
@@ -31,7 +52,8 @@ pub(crate) struct PatchBuffer {
     /// The second patch is current.
     second: bool,
     task: Task,
-    /// The first patch of a pass for which the other patch is collapsed.
+    ahead: Ahead,
+    /// The first piece of a pass for which the other patch is collapsed.
     prepared: Option<(Route, Piece)>,
 }
 
@@ -41,6 +63,7 @@ impl PatchBuffer {
         patches: [Patch::NONE; 2],
         second: false,
         task: Task::Done,
+        ahead: Ahead::Unknown,
         prepared: None,
     };
 
@@ -71,12 +94,15 @@ impl PatchBuffer {
     #[cfg(test)]
     pub(crate) fn disable(&mut self) {
         self.task = Task::Faulty;
+        if matches!(self.ahead, Ahead::Station(..)) {
+            self.ahead = Ahead::Unknown;
+        }
     }
 
     /// Collapses the first patch of the next pass ahead of [`Self::begin`], while the present pass needs no further patch. A fault is left for that.
     #[inline(never)]
     pub(crate) fn prepare(&mut self, job: &Job<'_>, route: &Route) {
-        self.task = Task::Faulty;
+        (self.task, self.ahead) = (Task::Faulty, Ahead::Unknown);
         let piece = route.first(job);
         let is_sound = self.both().1.lay(job, route, &piece).is_ok();
         self.prepared = is_sound.then_some((*route, piece));
@@ -87,57 +113,145 @@ impl PatchBuffer {
         self.prepared = None;
     }
 
-    /// Makes the first patch of a pass current.
+    /// The first piece of a pass, and whether its patch is collapsed.
+    pub(crate) fn first_piece(&self, job: &Job<'_>, route: &Route) -> (Piece, bool) {
+        match &self.prepared {
+            Some((prepared, piece)) if prepared == route => (*piece, true),
+            _ => (route.first(job), false),
+        }
+    }
+
+    /// Makes the first patch of a pass current; `piece`: that of [`Self::first_piece`].
     ///
     /// # Errors
     /// Those of [`Patch::collapse`].
-    pub(crate) fn begin(&mut self, job: &Job<'_>, route: &Route, piece: &Piece) -> Result<()> {
-        self.task = Task::Ends;
-        if self.prepared.take() == Some((*route, *piece)) {
+    pub(crate) fn begin(
+        &mut self,
+        job: &Job<'_>,
+        route: &Route,
+        (piece, is_prepared): (&Piece, bool),
+    ) -> Result<()> {
+        self.prepared = None;
+        self.restart_tasks();
+        if is_prepared {
             self.second = !self.second;
             return Ok(());
         }
         self.both().0.lay(job, route, piece)
     }
 
-    /// Makes the next piece of the pass current.
+    const fn restart_tasks(&mut self) {
+        (self.task, self.ahead) = (Task::Next, Ahead::Unknown);
+    }
+
+    /// The piece after this one; none at the end of the pass.
+    pub(crate) fn next(&mut self, job: &Job<'_>, route: &Route, piece: &Piece) -> Option<&Piece> {
+        if matches!(self.ahead, Ahead::Unknown) {
+            self.find_next(job, route, piece);
+        }
+        match &self.ahead {
+            Ahead::Patch(next, _) | Ahead::Station(next, ..) => Some(next),
+            Ahead::Unknown | Ahead::None => None,
+        }
+    }
+
+    /// Whether the pass ends with the current piece, as far as it is known.
+    pub(crate) const fn is_last(&self) -> bool {
+        matches!(self.ahead, Ahead::None)
+    }
+
+    fn find_next(&mut self, job: &Job<'_>, route: &Route, piece: &Piece) {
+        self.ahead = match route.next(job, piece) {
+            Some(next) => Ahead::Patch(next, false),
+            None => Ahead::None,
+        };
+    }
+
+    /// The piece after the current one, where that is on the same patch and prepared, and the jump of the derivative of the logarithmic speed derivative.
+    pub(crate) const fn station(&self) -> Option<(&Piece, f32)> {
+        match &self.ahead {
+            Ahead::Station(piece, _, Some(jump)) => Some((piece, *jump)),
+            _ => None,
+        }
+    }
+
+    /// Makes the next piece of the pass current, that of [`Self::next`].
     ///
     /// # Errors
     /// Those of [`Patch::collapse`].
-    pub(crate) fn advance(&mut self, job: &Job<'_>, route: &Route, piece: &Piece) -> Result<()> {
+    pub(crate) fn advance(&mut self, job: &Job<'_>, route: &Route) -> Result<()> {
         self.prepared = None;
-        if !matches!(self.task, Task::AheadEnds | Task::Done) {
-            self.both().1.lay(job, route, piece)?;
+        match self.ahead {
+            Ahead::Station(piece, curve, _) => self.both().0.go_on(&piece, curve),
+            Ahead::Patch(_, true) => self.second = !self.second,
+            Ahead::Patch(piece, false) => {
+                self.both().1.lay(job, route, &piece)?;
+                self.second = !self.second;
+            }
+            Ahead::Unknown | Ahead::None => {}
         }
-        self.second = !self.second;
-        self.task = if self.patch().has_ends() {
-            Task::Ahead
-        } else {
-            Task::Ends
-        };
+        self.restart_tasks();
         Ok(())
     }
 
     /// Executes one task, for a run on this piece.
     #[inline(never)]
     pub(crate) fn work(&mut self, job: &Job<'_>, route: &Route, piece: &Piece) {
-        let task = self.task;
-        let (patch, ahead) = self.both();
-        self.task = match task {
-            Task::Ends => {
-                patch.find_ends();
-                Task::Ahead
+        self.task = match self.task {
+            Task::Next => {
+                self.find_next(job, route, piece);
+                match self.ahead {
+                    // On a line that takes a few cycles.
+                    Ahead::Patch(..) if !route.is_on_front() => self.prepare_next(job, route, piece),
+                    Ahead::Patch(..) => Task::Ahead,
+                    _ => Task::End,
+                }
             }
-            Task::Ahead => match route.next(job, piece) {
-                Some(next) if ahead.lay(job, route, &next).is_ok() => Task::AheadEnds,
-                Some(_) => Task::Faulty,
-                None => Task::Done,
-            },
-            Task::AheadEnds => {
-                ahead.find_ends();
+            Task::Ahead => self.prepare_next(job, route, piece),
+            Task::Jump => {
+                let patch = self.patch();
+                let jump = match &self.ahead {
+                    Ahead::Station(_, curve, _) => Some(patch.jump_to(curve)),
+                    _ => None,
+                };
+                if let Ahead::Station(_, _, known) = &mut self.ahead {
+                    *known = jump;
+                }
                 Task::Done
             }
-            Task::Done | Task::Faulty => task,
+            Task::Start => {
+                self.both().1.find_start();
+                if route.is_on_front() {
+                    Task::Change
+                } else {
+                    Task::End
+                }
+            }
+            Task::Change => {
+                self.both().1.find_change();
+                Task::End
+            }
+            Task::End => {
+                self.both().0.find_end();
+                Task::Done
+            }
+            Task::Done | Task::Faulty => self.task,
         };
+    }
+
+    /// Collapses the next patch, or makes the next curve on this one. Returns the task after it.
+    fn prepare_next(&mut self, job: &Job<'_>, route: &Route, piece: &Piece) -> Task {
+        let Ahead::Patch(next, _) = self.ahead else {
+            return Task::End;
+        };
+        if let Some(curve) = route.curve_on_same_patch(job, piece, &next) {
+            self.ahead = Ahead::Station(next, curve, None);
+            return Task::Jump;
+        }
+        if self.both().1.lay(job, route, &next).is_err() {
+            return Task::Faulty;
+        }
+        self.ahead = Ahead::Patch(next, true);
+        Task::Start
     }
 }

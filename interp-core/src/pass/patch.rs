@@ -3,8 +3,8 @@
 use crate::fault::{Fault, FaultKind, Result};
 use crate::job::program::Job;
 use crate::job::{SurfaceKind, ToolSide};
-use crate::math::arith::{centred, power_of_two};
-use crate::math::number::NM_PER_MM_F32;
+use crate::math::arith::{centred, fraction_from_f32, fraction_to_f32, power_of_two};
+use crate::math::number::{Bounded, NM_PER_MM_F32};
 use crate::pass::front::{FrontLine, FrontPiece};
 use crate::pass::interval::Interval;
 use crate::pass::offset::{Locator, origin_q30};
@@ -13,7 +13,8 @@ use crate::pass::route::{Piece, Route};
 use crate::sample::SpanParameter;
 use crate::surface::{
     Ball, CirclePass, Contact, CurvePass, Derivatives, GridPass, IsoLine, OffsetUnits, POLYNOMIAL_WORDS,
-    PathSpeed, ProfilePass, RATIONAL_WORDS, REVOLVED_WORDS, RecordKind, Surface, split_patch, split_revolved,
+    PathSpeed, ProfilePass, RATIONAL_WORDS, REVOLVED_WORDS, RecordKind, SideCurve, Surface, split_patch,
+    split_revolved,
 };
 
 /// A patch on a pass. Units are the patch's, 2^-shift nm.
@@ -33,8 +34,33 @@ pub(crate) struct Patch {
     pub(crate) point: bool,
     /// Start and end of the pass on it, fractions in the direction of travel.
     pub(crate) range: [u64; 2],
-    /// The parametrisation at start and end, once [`Self::find_ends`] was called.
-    ends: Option<[PathSpeed; 2]>,
+    /// The parametrisation at start and end, once [`Self::find_start`] and [`Self::find_end`] were called.
+    start: Option<PathSpeed>,
+    end: Option<PathSpeed>,
+    /// Change of the logarithmic speed derivative over the first period at the programmed feed, once [`Self::find_change`] was called.
+    change: Option<f32>,
+}
+
+/// Least part of the first period's step over which the change of the parametrisation is taken.
+const CHANGE_PART: f32 = 0.25;
+
+/// A piece of a front on a patch: its curve, whether its ends are on the last side boundary, and whether that is the end of the side span.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct OnFront {
+    curve: SideCurve,
+    are_on_boundary: [bool; 2],
+    is_far: bool,
+}
+
+impl OnFront {
+    pub(crate) fn new(job: &Job<'_>, line: &FrontLine, on: &FrontPiece) -> Self {
+        let (are_on_boundary, is_far) = line.boundary_of(on);
+        Self {
+            curve: line.side_curve(job, on),
+            are_on_boundary,
+            is_far,
+        }
+    }
 }
 
 impl Patch {
@@ -49,7 +75,9 @@ impl Patch {
         per_mm: 1.0,
         point: false,
         range: [0, u64::MAX],
-        ends: None,
+        start: None,
+        end: None,
+        change: None,
     };
 
     /// Becomes the patch of a piece of a pass.
@@ -59,7 +87,7 @@ impl Patch {
     pub(crate) fn lay(&mut self, job: &Job<'_>, route: &Route, piece: &Piece) -> Result<()> {
         self.range = piece.range;
         match (&route.front, &piece.front) {
-            (Some(line), Some(on)) => self.lay_on_front(job, line, on, &piece.position),
+            (Some(line), Some(on)) => self.lay_on_front(job, line, on, piece),
             _ => self.collapse(job, &piece.position),
         }
     }
@@ -69,18 +97,37 @@ impl Patch {
         &mut self,
         job: &Job<'_>,
         line: &FrontLine,
-        piece: &FrontPiece,
-        position: &PassPosition,
+        on: &FrontPiece,
+        piece: &Piece,
     ) -> Result<()> {
-        let PassPosition { side, span, reversed } = *position;
+        let PassPosition { side, span, .. } = piece.position;
         self.take_record(job, [span, side.span])?;
-        let range = self.range;
-        if let Surface::Curve(pass) = &mut self.surface {
-            let (are_on, is_far) = line.boundary_of(piece);
-            pass.set_curve(line.side_curve(job, piece));
-            pass.set_ends(reversed, range, are_on, is_far);
-        }
+        self.go_on(piece, OnFront::new(job, line, on));
         Ok(())
+    }
+
+    /// The jump of the derivative of the logarithmic speed derivative at the end of the piece, where this one follows.
+    pub(crate) fn jump_to(&self, on: &OnFront) -> f32 {
+        let [_, end] = self.range;
+        match &self.surface {
+            Surface::Curve(pass) => pass.jump(end, &on.curve),
+            _ => 0.0,
+        }
+    }
+
+    /// Goes on with another piece of a front on this patch.
+    pub(crate) fn go_on(&mut self, piece: &Piece, on: OnFront) {
+        self.range = piece.range;
+        self.forget_ends();
+        if let Surface::Curve(pass) = &mut self.surface {
+            pass.set_curve(on.curve);
+            pass.set_ends(
+                piece.position.reversed,
+                piece.range,
+                on.are_on_boundary,
+                on.is_far,
+            );
+        }
     }
 
     /// Becomes the patch of a path span and a side span, to be evaluated at any place.
@@ -132,7 +179,7 @@ impl Patch {
             pass.take(kind, words, radius);
         }
         self.point = false;
-        self.ends = None;
+        self.forget_ends();
         Ok(())
     }
 
@@ -197,7 +244,7 @@ impl Patch {
             }
         }
         self.point = self.surface.is_point();
-        self.ends = None;
+        self.forget_ends();
         Ok(())
     }
 
@@ -206,42 +253,62 @@ impl Patch {
         match &self.surface {
             Surface::Curve(pass) => SpanParameter {
                 span: position.side.span,
-                fraction: pass.side(fraction).fraction,
+                fraction: pass.side_fraction(fraction),
             },
             _ => position.side,
         }
     }
 
-    /// Computes the parametrisation at both ends, and stores it for [`Self::start`] and [`Self::end`].
-    pub(crate) fn find_ends(&mut self) {
-        self.ends = Some([self.start(), self.end()]);
+    /// Computes the parametrisation at the start, and stores it for [`Self::start`].
+    pub(crate) fn find_start(&mut self) {
+        self.start = Some(self.start());
     }
 
-    /// Whether [`Self::find_ends`] was called.
-    pub(crate) const fn has_ends(&self) -> bool {
-        self.ends.is_some()
+    /// Computes the change of the parametrisation over the first period, and stores it for [`Self::change`].
+    pub(crate) fn find_change(&mut self) {
+        let ([start, end], speed) = (self.range, self.start());
+        let step = self.arc * speed.inv_speed;
+        // The curve ends with the piece.
+        let room = fraction_to_f32(end.saturating_sub(start));
+        let length = step.at_most(room);
+        if length >= CHANGE_PART * step {
+            let then = self
+                .surface
+                .path_at(start.saturating_add(fraction_from_f32(length)).min(end));
+            let change = then.log_speed_derivative - speed.log_speed_derivative;
+            self.change = Some(change * (step / length));
+        }
+    }
+
+    /// Change of the logarithmic speed derivative over the first period, where it is known.
+    pub(crate) const fn change(&self) -> Option<f32> {
+        self.change
+    }
+
+    fn forget_ends(&mut self) {
+        (self.start, self.end, self.change) = (None, None, None);
+    }
+
+    /// Computes the parametrisation at the end, and stores it for [`Self::end`].
+    pub(crate) fn find_end(&mut self) {
+        self.end = Some(self.end());
+    }
+
+    /// Whether [`Self::find_end`] was called.
+    pub(crate) const fn has_end(&self) -> bool {
+        self.end.is_some()
     }
 
     /// The parametrisation at the start of the pass on the patch, in the direction of travel.
     pub(crate) fn start(&self) -> PathSpeed {
-        match self.ends {
-            Some([start, _]) => start,
-            None => {
-                let [start, _] = self.range;
-                self.surface.path_at(start)
-            }
-        }
+        let [start, _] = self.range;
+        self.start.unwrap_or_else(|| self.surface.path_at(start))
     }
 
     /// The parametrisation at the end of the pass on the patch, in the direction of travel.
     pub(crate) fn end(&self) -> PathSpeed {
-        match self.ends {
-            Some([_, end]) => end,
-            None => {
-                let [_, end] = self.range;
-                self.surface.path_at(end)
-            }
-        }
+        let [_, end] = self.range;
+        self.end.unwrap_or_else(|| self.surface.path_at(end))
     }
 
     /// A patch of a grid, with one block per coordinate.

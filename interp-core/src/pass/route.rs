@@ -3,6 +3,7 @@
 use crate::job::program::Job;
 use crate::job::{Header, Pattern};
 use crate::pass::front::{FrontLine, FrontPiece, PiecePlace};
+use crate::pass::patch::OnFront;
 use crate::pass::position::PassPosition;
 use crate::sample::SpanParameter;
 
@@ -99,6 +100,14 @@ impl Route {
         }
         let next = piece.position.next(job.header.path_spans)?;
         Some(self.piece(next.span))
+    }
+
+    /// The curve of a piece of a front on the patch of another; none where it is on another patch.
+    pub(crate) fn curve_on_same_patch(&self, job: &Job<'_>, piece: &Piece, next: &Piece) -> Option<OnFront> {
+        let (front, on) = (self.front.as_ref()?, next.front.as_ref()?);
+        let (here, there) = (&piece.position, &next.position);
+        let is_same = here.span == there.span && here.side.span == there.side.span;
+        is_same.then(|| OnFront::new(job, front, on))
     }
 
     const fn on_front(&self, place: PiecePlace) -> Piece {

@@ -13,13 +13,14 @@ mod travel;
 use crate::fault::{Fault, FaultKind, Result};
 use crate::job::Pattern;
 use crate::job::program::{Job, Program};
+use crate::math::arith::{advanced, fraction_from_f32, fraction_to_f32};
 use crate::pass::buffer::PatchBuffer;
 use crate::pass::contact::{self, Reach};
 use crate::pass::lines::{NextPass, RegionLines};
 use crate::pass::route::Route;
 use crate::pass::schedule;
 use crate::sample::{Sample, SpanParameter, interval_of};
-use crate::surface::AnyPass;
+use crate::surface::{AnyCurve, AnyPass, PathSpeed};
 use next_pass::PassPlanning;
 use travel::{Next, Travel};
 
@@ -30,6 +31,9 @@ const CROSSINGS_MAX: u8 = 1;
 /// Step of the parameter on a pole: 16 per span. Between two steps the speed of the side lines, a rational cubic of the path
 /// parameter, changes little.
 const POLE_STEP: u64 = 1 << 60;
+
+/// Greatest correction of a step beyond a station, as a share of what is beyond it.
+const SHARE_MAX: f32 = 1.0 / 256.0;
 
 /// The same on a front, whose intervals are two periods long, except on short passes.
 const CROSSINGS_ON_FRONT_MAX: u8 = 4;
@@ -112,8 +116,9 @@ impl Run {
                 travel.log_speed_derivative_before,
                 self.buffer.patch().arc,
             );
-            if let Some(fraction) = step.and_then(|step| travel.beyond(step)) {
-                travel.fraction = fraction;
+            if let Some(step) = step
+                && self.moves(job, step)?
+            {
                 self.sample(last)?;
                 if self.buffer.has_work() {
                     self.buffer.work(job, &self.travel.route, &self.travel.piece);
@@ -142,6 +147,7 @@ impl Run {
                 }
                 None => return Ok(false),
             },
+            Next::Begun => self.travel.next = Next::Along,
             Next::End => return Ok(false),
         }
         self.sample(last)?;
@@ -222,8 +228,9 @@ impl Run {
         let before = travel.path.log_speed_derivative - change;
         self.last_feed_factor = feed_factor;
         let step = contact::step(&travel.path, before, feed_factor * self.buffer.patch().arc);
-        if let Some(fraction) = step.and_then(|step| travel.beyond(step)) {
-            travel.fraction = fraction;
+        if let Some(step) = step
+            && self.moves(job, step)?
+        {
             self.sample(last)?;
             last.feed_mm_s = job.header.feed_mm_s * feed_factor;
             if self.buffer.has_work() {
@@ -245,8 +252,8 @@ impl Run {
     /// As [`Self::advance`]; [`FaultKind::PatchTooShort`] where a whole patch is still left.
     pub(crate) fn finish_pass(&mut self, job: &Job<'_>, last: &mut Sample) -> Result<()> {
         if self.is_along() {
-            let travel = &self.travel;
-            let is_last = travel.route.next(job, &travel.piece).is_none();
+            let Self { travel, buffer, .. } = self;
+            let is_last = buffer.next(job, &travel.route, &travel.piece).is_none();
             if !is_last && !self.next_piece(job)? {
                 return Err(Fault::new(FaultKind::PatchTooShort, 0.0));
             }
@@ -326,15 +333,62 @@ impl Run {
             AnyPass::Profile(pass) => travel.sample(pass, patch, last),
             AnyPass::Circle(pass) => travel.sample(pass, patch, last),
             AnyPass::Curve(pass) => {
-                travel.sample(pass, patch, last)?;
+                let side = pass.side(travel.fraction);
+                let fraction = pass.own_side(&side);
+                match pass.on(side) {
+                    AnyCurve::Polynomial(pass) => travel.sample(&pass, patch, last),
+                    AnyCurve::Rational(pass) => travel.sample(&pass, patch, last),
+                    AnyCurve::Pole(pass) => travel.sample(&pass, patch, last),
+                    AnyCurve::Revolved(pass) => travel.sample(&pass, patch, last),
+                }?;
                 travel.side = SpanParameter {
                     span: travel.piece.position.side.span,
-                    fraction: pass.side(travel.fraction).fraction,
+                    fraction,
                 };
                 last.side = travel.side;
                 Ok(())
             }
         }
+    }
+
+    /// Moves by a step of the series, if that ends on the piece, or on the next one where that is on the same patch: at a station of a front slope and
+    /// curvature are continuous.
+    #[inline(always)]
+    fn moves(&mut self, job: &Job<'_>, step: u64) -> Result<bool> {
+        let travel = &mut self.travel;
+        if let Some(fraction) = travel.beyond(step) {
+            travel.fraction = fraction;
+            return Ok(true);
+        }
+        self.crosses_station(job, step)
+    }
+
+    #[inline(never)]
+    fn crosses_station(&mut self, job: &Job<'_>, step: u64) -> Result<bool> {
+        let Self { travel, buffer, .. } = self;
+        let Some(((piece, jump), fraction)) = buffer.station().zip(advanced(travel.fraction, step)) else {
+            return Ok(false);
+        };
+        let end = travel.piece.end();
+        let [before, beyond] = [(end, travel.fraction), (fraction, end)]
+            .map(|(to, from)| fraction_to_f32(to.saturating_sub(from)));
+        // The speed beyond the station differs by a relative `jump x^2 / 2` at the distance x, the arc by that of the cube.
+        let share = jump * beyond * beyond * (1.0 / 6.0);
+        if fraction > piece.end() || !(share.abs() <= SHARE_MAX) {
+            return Ok(false);
+        }
+        let correction = fraction_from_f32(beyond * share.abs());
+        let corrected = if jump > 0.0 {
+            fraction.saturating_sub(correction)
+        } else {
+            fraction.saturating_add(correction)
+        };
+        travel.fraction = corrected.max(piece.start()).min(piece.end());
+        travel.piece = *piece;
+        // The last sample's, had it been on the next curve.
+        travel.path.log_speed_derivative -= jump * before;
+        buffer.advance(job, &travel.route)?;
+        Ok(true)
     }
 
     /// `feed_factor` of a period's arc along the pass, by quadrature, across at most [`CROSSINGS_MAX`] boundaries.
@@ -361,7 +415,8 @@ impl Run {
                     Reach::Beyond(covered) => covered,
                 };
             rest = (arc - covered) / patch.per_mm;
-            if self.travel.route.next(job, &self.travel.piece).is_none() {
+            let Self { travel, buffer, .. } = self;
+            if buffer.next(job, &travel.route, &travel.piece).is_none() {
                 self.end_pass(job);
                 return Ok(());
             }
@@ -370,8 +425,32 @@ impl Run {
             }
             self.next_piece(job)?;
             start = self.buffer.patch().start().checked()?;
+            if self.continues(&start, rest, feed_factor) {
+                return Ok(());
+            }
         }
         Err(Fault::new(FaultKind::PatchTooShort, rest))
+    }
+
+    /// Moves by the rest of a period's arc, mm, by the series from the start of a patch on a front, where the change of the parametrisation there is known: without
+    /// an evaluation. Returns whether it holds.
+    fn continues(&mut self, start: &PathSpeed, rest: f32, feed_factor: f32) -> bool {
+        let Self { travel, buffer, .. } = self;
+        let patch = buffer.patch();
+        let Some(change) = patch.change() else {
+            return false;
+        };
+        let arc = rest * patch.per_mm;
+        let part = arc / patch.arc;
+        let before = start.log_speed_derivative - part * change;
+        let step = contact::step(start, before, arc);
+        let Some(fraction) = step.and_then(|step| travel.beyond(step)) else {
+            return false;
+        };
+        travel.fraction = fraction;
+        // That of a sample one such period before the next one.
+        travel.path.log_speed_derivative = start.log_speed_derivative + (part - feed_factor) * change;
+        true
     }
 
     /// On a pole, advances the path parameter: the tool stands, but the interval that the pass allows depends on the parameter.
@@ -386,14 +465,14 @@ impl Run {
 
     /// Moves to the start of the next piece of the pass; false at the pass's end.
     fn next_piece(&mut self, job: &Job<'_>) -> Result<bool> {
-        let travel = &mut self.travel;
-        let Some(piece) = travel.route.next(job, &travel.piece) else {
+        let Self { travel, buffer, .. } = self;
+        let Some(piece) = buffer.next(job, &travel.route, &travel.piece) else {
             return Ok(false);
         };
-        travel.piece = piece;
-        travel.fraction = piece.start();
+        travel.piece = *piece;
+        travel.fraction = travel.piece.start();
         travel.path.log_speed_derivative = f32::NAN;
-        self.buffer.advance(job, &travel.route, &piece)?;
+        buffer.advance(job, &travel.route)?;
         Ok(true)
     }
 
@@ -407,7 +486,8 @@ impl Run {
             // Fronts begin at places that are not next to each other.
             travel.offset = [0; 3];
         }
-        travel.piece = route.first(job);
+        let (piece, is_prepared) = self.buffer.first_piece(job, &route);
+        travel.piece = piece;
         travel.fraction = travel.piece.start();
         // The maximum is that of all passes on the line.
         let goes_on = travel.pass > 0 && route.side == side_before;
@@ -427,7 +507,8 @@ impl Run {
             }
             scan.begin(&route, goes_on);
         }
-        self.buffer.begin(job, &travel.route, &travel.piece)
+        self.buffer
+            .begin(job, &travel.route, (&travel.piece, is_prepared))
     }
 
     /// Whether the run is exactly at the end of the pass.

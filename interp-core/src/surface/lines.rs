@@ -3,7 +3,7 @@
 use super::range::{HeadWord, Root};
 use super::rational::WEIGHT_ONE;
 use super::{Edges, IsoLine};
-use crate::math::arith::{cubic, jet, quadratic};
+use crate::math::arith::{add, cubic, jet, mul_hi, quadratic, tangent};
 
 /// One coordinate on a pass: cubics of the path parameter, fixed point.
 #[derive(Clone, Copy, Debug, Default)]
@@ -31,12 +31,26 @@ impl CoordinateCubics {
         side2: [0; 4],
     };
 
-    /// Those of a block at a side parameter.
+    /// One coordinate of a [`super::Local`] at a path parameter.
     #[inline(always)]
-    pub(super) fn at(block: &[i32; 16], at: &IsoLine) -> Self {
-        let mut cubics = Self::NONE;
-        cubics.collapse(block, at);
-        cubics
+    pub(super) fn point(&self, w: i32) -> CoordinatePoint {
+        let [value, path, path2] = jet(&self.value, w);
+        let [side, mixed] = tangent(&self.side, w);
+        [value, path, path2, side, mixed, cubic(&self.side2, w)]
+    }
+
+    /// Those of a block at a side parameter, in the surface's own direction.
+    #[inline(always)]
+    pub(super) fn at(block: &[i32; 16], side: i32) -> Self {
+        let [row0, row1, row2, row3] = rows(block);
+        // Not by `map`, which is a loop.
+        let ([v0, s0, h0], [v1, s1, h1]) = (jet(row0, side), jet(row1, side));
+        let ([v2, s2, h2], [v3, s3, h3]) = (jet(row2, side), jet(row3, side));
+        Self {
+            value: [v0, v1, v2, v3],
+            side: [s0, s1, s2, s3],
+            side2: [h0, h1, h2, h3],
+        }
     }
 
     /// Collapses `c[i][j]` of `path^i side^j`, j fastest, at a side parameter.
@@ -54,6 +68,47 @@ impl CoordinateCubics {
             odd = !odd;
         }
     }
+}
+
+/// One coordinate: position, path, half of path,path; side, mixed, half of side,side.
+pub(super) type CoordinatePoint = [i32; 6];
+
+/// The rows of a block.
+#[inline(always)]
+fn rows(block: &[i32; 16]) -> [&[i32; 4]; 4] {
+    const NONE: [i32; 4] = [0; 4];
+    match block.as_chunks().0 {
+        [row0, row1, row2, row3] => [row0, row1, row2, row3],
+        _ => [&NONE; 4],
+    }
+}
+
+/// [`CoordinateCubics::point`] of a block, to the same bits: row by row from the highest power of the path, so that nothing but six sums lives from row to row, for
+/// which a Cortex-M has registers.
+#[inline(always)]
+pub(super) fn point_by_rows(block: &[i32; 16], side: i32, w: i32) -> CoordinatePoint {
+    let row = |row: &[i32; 4]| jet(row, side);
+    let [row0, row1, row2, row3] = rows(block);
+    let [v3, s3, h3] = row(row3);
+    let (v3, s3, h3) = (mul_hi(v3, w), mul_hi(s3, w), mul_hi(h3, w));
+    let [v2, s2, h2] = row(row2);
+    let (v2, s2, h2) = (add(v2, v3), add(s2, s3), add(h2, h3));
+    let [v1, s1, h1] = row(row1);
+    let (v1, s1, h1) = (
+        add(v1, mul_hi(v2, w)),
+        add(s1, mul_hi(s2, w)),
+        add(h1, mul_hi(h2, w)),
+    );
+    let (v2, s2) = (add(v2, v3), add(s2, s3));
+    let [v0, s0, h0] = row(row0);
+    [
+        add(v0, mul_hi(v1, w)),
+        add(v1, mul_hi(v2, w)),
+        add(v2, v3),
+        add(s0, mul_hi(s1, w)),
+        add(s1, mul_hi(s2, w)),
+        add(h0, mul_hi(h1, w)),
+    ]
 }
 
 /// Negates the coefficients of odd powers where the pass runs backwards.
@@ -134,4 +189,25 @@ pub(super) fn quotient_across(block: &[i32; 16], root: Root, at: &IsoLine) -> [i
 pub(super) fn quotient_along(c: &[i32; 4], root: Root) -> [i32; 4] {
     let [q0, q1, q2] = root.divide(c);
     [q0, q1, q2, 0]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// By rows, the same bits as by the cubics of the path.
+    #[test]
+    fn a_point_by_rows_is_that_of_the_cubics() {
+        let mut state = 1_u32;
+        let mut random = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            state.cast_signed() >> 4
+        };
+        for _ in 0..10_000 {
+            let block = [0; 16].map(|_: i32| random());
+            let (side, w) = (random() << 4, random() << 4);
+            let want = CoordinateCubics::at(&block, side).point(w);
+            assert_eq!(point_by_rows(&block, side, w), want);
+        }
+    }
 }

@@ -26,6 +26,7 @@ mod polynomial;
 mod range;
 mod rational;
 mod revolved;
+mod side_curve;
 
 pub use polynomial::{POLYNOMIAL_WORDS, PolynomialRecord};
 pub use range::{Edges, SHIFT_MAX};
@@ -33,12 +34,13 @@ pub use rational::{RATIONAL_WORDS, RationalRecord};
 pub use revolved::{REVOLVED_WORDS, RevolvedRecord};
 
 pub(crate) use ball::{Ball, OffsetUnits};
-pub(crate) use curve::{CurvePass, RecordKind, SideCurve};
+pub(crate) use curve::{AnyCurve, CurvePass, RecordKind};
 pub(crate) use grid::{GridKind, GridPass};
 pub(crate) use pole::PolePass;
 pub(crate) use polynomial::{ExtrudedPass, PolynomialPass, RuledPass};
 pub(crate) use rational::RationalPass;
 pub(crate) use revolved::{CirclePass, ProfilePass};
+pub(crate) use side_curve::SideCurve;
 
 use crate::fault::{Fault, FaultKind, Result};
 use crate::math::arith::{dot_hi, fraction_32, inverse_sqrt, power_of_two, sqrt, to_f32};

@@ -7,7 +7,7 @@
 
 use super::Ball;
 use super::grid::GridPass;
-use super::lines::{CoordinateCubics, quotient_across, quotient_along};
+use super::lines::{CoordinateCubics, CoordinatePoint, quotient_across, quotient_along};
 use super::range::{Edges, Root};
 use super::rational::{Weight, quarter};
 use super::{Contact, Factors, IsoLine, Local, Pass, PathSpeed, path_factor};
@@ -49,11 +49,7 @@ pub(crate) struct PolePass<'a>(pub(super) &'a GridPass);
 impl Reduced {
     /// Placeholder before the first pole.
     pub(super) const NONE: Self = Self {
-        axes: [ReducedCubics {
-            value: [0; 4],
-            side: [0; 4],
-            side2: [0; 4],
-        }; 3],
+        axes: [ReducedCubics::NONE; 3],
         pole: Pole::Beside,
         path_factor: 1.0,
         inverse_path_factor: 1.0,
@@ -98,7 +94,14 @@ impl Pole {
 }
 
 impl ReducedCubics {
+    const NONE: Self = Self {
+        value: [0; 4],
+        side: [0; 4],
+        side2: [0; 4],
+    };
+
     /// Divides a coordinate by the root of the patch's flagged boundary.
+    #[inline(always)]
     fn reduce(&mut self, line: &CoordinateCubics, block: &[i32; 16], pole: Pole, edges: Edges, at: &IsoLine) {
         if let Pole::AtEnd(root) = pole {
             self.value = quotient_along(&line.value, root);
@@ -122,33 +125,34 @@ pub(super) struct PoleAt {
 }
 
 impl PoleAt {
-    /// The pole of a patch with these collapsed boundaries, if there is one.
-    pub(super) fn new(edges: Edges, at: &IsoLine) -> Option<Self> {
-        (edges.count() > 0).then(|| Self {
+    /// The pole of a patch with these collapsed boundaries, of which there is one.
+    pub(super) fn new(edges: Edges, at: &IsoLine) -> Self {
+        Self {
             pole: Pole::of(edges, at),
             edges,
             path_factors: path_factor(edges, at),
-        })
+        }
     }
 
-    /// One coordinate of a [`Local`]: position, path, path2, side, mixed, side2.
+    /// One coordinate of a [`Local`]. A branch for each pole, in which the derivatives that it does not use are left out.
     #[inline(never)]
-    pub(super) fn axis(
-        &self,
-        line: &CoordinateCubics,
-        block: &[i32; 16],
-        at: &IsoLine,
-        weight: &Weight,
-        w: i32,
-    ) -> [i32; 6] {
-        let mut reduced = ReducedCubics::default();
-        reduced.reduce(line, block, self.pole, self.edges, at);
-        let line = PoleLine {
-            line,
-            reduced: &reduced,
-            pole: self.pole,
+    pub(super) fn axis(&self, block: &[i32; 16], at: &IsoLine, weight: &Weight, w: i32) -> CoordinatePoint {
+        let of = |pole: Pole| {
+            let line = CoordinateCubics::at(block, at.side);
+            let mut reduced = ReducedCubics::NONE;
+            reduced.reduce(&line, block, pole, self.edges, at);
+            let line = PoleLine {
+                line: &line,
+                reduced: &reduced,
+                pole,
+            };
+            line.at(weight, w)
         };
-        line.at(weight, w)
+        match self.pole {
+            Pole::AtEnd(Root::Start) => of(Pole::AtEnd(Root::Start)),
+            Pole::AtEnd(Root::End) => of(Pole::AtEnd(Root::End)),
+            Pole::Beside => of(Pole::Beside),
+        }
     }
 
     pub(super) fn factors(&self, w: i32) -> Factors {
@@ -170,7 +174,7 @@ impl PolePass<'_> {
     /// The parametrisation at a fraction of the patch.
     pub(crate) fn path_at(&self, fraction: u64) -> PathSpeed {
         let w = centred(fraction);
-        let weight = Weight::at(&self.0.weight, w);
+        let weight = Weight::new(self.0.weight.point(w));
         let [x, y, z] = self.axes();
         let along = |axis: &PoleLine<'_>| axis.along(&weight, w);
         let ([x1, x2], [y1, y2], [z1, z2]) = (along(&x), along(&y), along(&z));
@@ -187,7 +191,7 @@ impl PolePass<'_> {
 
     #[inline(always)]
     fn local(&self, w: i32) -> Local {
-        let weight = Weight::at(&self.0.weight, w);
+        let weight = Weight::new(self.0.weight.point(w));
         let [x, y, z] = self.axes();
         weight.local(x.at(&weight, w), y.at(&weight, w), z.at(&weight, w))
     }
@@ -218,9 +222,9 @@ impl PoleLine<'_> {
         }
     }
 
-    /// One coordinate of a [`Local`]: position, path, path2, side, mixed, side2.
+    /// One coordinate of a [`Local`].
     #[inline(always)]
-    fn at(&self, weight: &Weight, w: i32) -> [i32; 6] {
+    fn at(&self, weight: &Weight, w: i32) -> CoordinatePoint {
         let [value, path, path2] = jet(&self.line.value, w);
         let [reduced, reduced_path, reduced_path2] = jet(&self.reduced.value, w);
         let [_, mixed] = tangent(&self.line.side, w);

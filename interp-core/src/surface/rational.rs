@@ -7,13 +7,11 @@
 
 use super::Ball;
 use super::grid::GridPass;
-use super::lines::{CoordinateCubics, coefficients, collapses, record_words, split};
+use super::lines::{CoordinatePoint, coefficients, collapses, record_words, split};
 use super::range::{BAD_PATCH, Edges, HeadWord, Root, fits, patch_bound};
 use super::{Contact, Factors, Local, Pass, PathSpeed};
 use crate::fault::Result;
-use crate::math::arith::{
-    centred, cubic, jet, mul_hi, mul_q29, quarter_of, reciprocal_q29, subtract, tangent, to_f32,
-};
+use crate::math::arith::{centred, cubic, mul_hi, mul_q29, quarter_of, reciprocal_q29, subtract, to_f32};
 
 /// Words of a rational patch.
 pub const RATIONAL_WORDS: usize = 68;
@@ -137,9 +135,7 @@ pub(super) struct Weight {
 
 impl Weight {
     #[inline(always)]
-    pub(super) fn at(line: &CoordinateCubics, w: i32) -> Self {
-        let [value, path, path2] = jet(&line.value, w);
-        let [side, mixed] = tangent(&line.side, w);
+    pub(super) fn new([value, path, path2, side, mixed, side2]: CoordinatePoint) -> Self {
         let float = to_f32(value) * WEIGHT_UNIT;
         let inverse = 1.0 / float;
         Self {
@@ -151,13 +147,13 @@ impl Weight {
             path2,
             side,
             mixed,
-            side2: cubic(&line.side2, w),
+            side2,
         }
     }
 
-    /// A [`Local`] of three coordinates: of each position, path, path2, side, mixed, side2.
+    /// A [`Local`] of three coordinates.
     #[inline(always)]
-    pub(super) const fn local(&self, x: [i32; 6], y: [i32; 6], z: [i32; 6]) -> Local {
+    pub(super) const fn local(&self, x: CoordinatePoint, y: CoordinatePoint, z: CoordinatePoint) -> Local {
         let ([x0, x1, x2, xs, xm, xx], [y0, y1, y2, ys, ym, yy], [z0, z1, z2, zs, zm, zz]) = (x, y, z);
         Local {
             position: [x0, y0, z0],
@@ -194,11 +190,12 @@ pub(super) fn quarter(numerator: i32, quotient: i32, weight: i32) -> i32 {
 /// A rational patch on one pass.
 pub(crate) struct RationalPass<'a>(pub(super) &'a GridPass);
 
-/// One coordinate of a [`Local`]: position, path, path2, side, mixed, side2.
+/// One coordinate of a [`Local`], from that of the numerator.
 #[inline(always)]
-pub(super) fn axis(line: &CoordinateCubics, weight: &Weight, w: i32) -> [i32; 6] {
-    let [value, path, path2] = jet(&line.value, w);
-    let [side, mixed] = tangent(&line.side, w);
+pub(super) fn quotient(
+    [value, path, path2, side, mixed, side2]: CoordinatePoint,
+    weight: &Weight,
+) -> CoordinatePoint {
     let s = weight.divide(value);
     [
         s,
@@ -206,7 +203,7 @@ pub(super) fn axis(line: &CoordinateCubics, weight: &Weight, w: i32) -> [i32; 6]
         quarter(path2, s, weight.path2),
         quarter(side, s, weight.side),
         quarter(mixed, s, weight.mixed),
-        quarter(cubic(&line.side2, w), s, weight.side2),
+        quarter(side2, s, weight.side2),
     ]
 }
 
@@ -222,9 +219,13 @@ impl RationalPass<'_> {
     #[inline(always)]
     fn local(&self, fraction: u64) -> Local {
         let w = centred(fraction);
-        let weight = Weight::at(&self.0.weight, w);
+        let weight = Weight::new(self.0.weight.point(w));
         let [x, y, z] = &self.0.axes;
-        weight.local(axis(x, &weight, w), axis(y, &weight, w), axis(z, &weight, w))
+        weight.local(
+            quotient(x.point(w), &weight),
+            quotient(y.point(w), &weight),
+            quotient(z.point(w), &weight),
+        )
     }
 }
 

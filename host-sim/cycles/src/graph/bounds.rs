@@ -107,7 +107,7 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         24,
         "steps to the place where a change begins: STEPS_AHEAD",
     ),
-    ("interp_core::feed::plan::Plan::span_of", 3, "axes"),
+    ("interp_core::feed::plan::motion::span_of", 3, "axes"),
     (
         "compiler_builtins::mem::impls::copy_backward::copy_backward_aligned_words",
         512,
@@ -140,22 +140,22 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "stations of half a turn: STATIONS",
     ),
     (
-        "interp_core::feed::walk::Walker::begin_means_at_speed",
+        "interp_core::feed::walk::means::begin_means_at_speed",
         160,
         "nodes of a mean: NODES_MAX",
     ),
     (
-        "interp_core::feed::walk::Walker::rest_at_jumps",
+        "interp_core::feed::walk::speeds::rest_at_jumps",
         167,
         "cells of a pass: STATIONS_MAX - 1",
     ),
     (
-        "interp_core::feed::walk::Walker::flatten",
+        "interp_core::feed::walk::speeds::flatten",
         168,
         "stations of a pass: STATIONS_MAX",
     ),
     (
-        "interp_core::sequence::lookahead::Lookahead::find_turn",
+        "interp_core::sequence::lookahead::turn_search::find_turn",
         11,
         "stations of half a turn: STATIONS",
     ),
@@ -163,11 +163,6 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "interp_core::pass::scan::PassScan::work",
         33,
         "pieces of a portion: PIECES_MAX",
-    ),
-    (
-        "interp_core::feed::walk::Walker::mean_at_speed",
-        2,
-        "ends of a plan",
     ),
     (
         "interp_core::sequence::link::BoundaryStepOver::choose_curve",
@@ -190,7 +185,7 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "halvings of the stations: CELL_BISECTIONS",
     ),
     (
-        "interp_core::feed::plan::Plan::speed_over",
+        "interp_core::feed::plan::motion::speed_over",
         8,
         "halvings of the jumps, and those near a place",
     ),
@@ -250,33 +245,28 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "busy places: LIST",
     ),
     (
-        "interp_core::feed::walk::Walker::backwards",
+        "interp_core::feed::walk::speeds::backwards",
         168,
         "stations: STATIONS_MAX",
     ),
-    ("interp_core::feed::walk::Walker::cap", 3, "axes"),
+    ("interp_core::feed::walk::speeds::cap", 3, "axes"),
     (
-        "interp_core::feed::walk::Walker::find_busy",
-        168,
-        "stations: STATIONS_MAX",
-    ),
-    (
-        "interp_core::feed::walk::Walker::forwards",
+        "interp_core::feed::walk::nodes::find_busy",
         168,
         "stations: STATIONS_MAX",
     ),
     (
-        "interp_core::feed::walk::Walker::increment",
+        "interp_core::feed::walk::speeds::forwards",
         168,
         "stations: STATIONS_MAX",
     ),
     (
-        "interp_core::feed::walk::Walker::mean",
-        162,
-        "coefficients of a pace: COEFFICIENTS",
+        "interp_core::feed::walk::means::increment",
+        168,
+        "stations: STATIONS_MAX",
     ),
     (
-        "interp_core::feed::walk::Walker::slow_at_jump",
+        "interp_core::feed::walk::speeds::slow_at_jump",
         20,
         "stations around a jump, twice JUMP_STATIONS",
     ),
@@ -316,17 +306,17 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "powers of two of a span's parts",
     ),
     (
-        "interp_core::pass::front::advance::Advance::has_crest",
+        "interp_core::pass::front::advance::measuring::has_crest",
         16,
         "places that are passed over: CHUNK",
     ),
     (
-        "interp_core::pass::front::advance::Advance::is_near",
+        "interp_core::pass::front::advance::stepping::is_near",
         18,
         "stations beside one: 2 REACH + 1",
     ),
     (
-        "interp_core::pass::front::advance::Advance::pass_over",
+        "interp_core::pass::front::advance::stepping::pass_over",
         16,
         "places that are passed over: CHUNK",
     ),
@@ -391,12 +381,12 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "sides of a knot",
     ),
     (
-        "interp_core::sequence::lookahead::Lookahead::differentiate",
+        "interp_core::sequence::lookahead::stations::store_start",
         168,
         "stations of a pass: STATIONS",
     ),
     (
-        "interp_core::sequence::lookahead::Lookahead::finish_short",
+        "interp_core::sequence::lookahead::stretch::finish_short",
         168,
         "stations of a pass: STATIONS",
     ),
@@ -411,9 +401,9 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "pieces of an arc: CROSSINGS_ON_FRONT_MAX + 1",
     ),
     (
-        "interp_core::surface::curve::weighted_at",
-        4,
-        "rows of a block; coordinates",
+        "interp_core::surface::curve::CurvePass::take",
+        64,
+        "words of a record",
     ),
     (
         "interp_core::surface::grid::GridPass::collapse",
@@ -421,9 +411,57 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "rows of a block; coordinates",
     ),
     (
-        "interp_core::sequence::sequencer::Sequencer::next_cycles",
+        "interp_core::sequence::sequencer::planning::next_cycles",
         2,
         "ends of a plan that are compared",
+    ),
+    ("interp_core::feed::newton::rows::Place::rows", 3, "axes"),
+    ("interp_core::feed::plan::motion::MotionAt::each_axis", 3, "axes"),
+    (
+        "interp_core::feed::profile::ProfilePlace::advance",
+        8,
+        "slots of a profile that a period may pass: SLOTS_A_STEP",
+    ),
+    (
+        "interp_core::feed::turn::Turn::derivatives",
+        8,
+        "coefficients of a turn; axes",
+    ),
+    (
+        "interp_core::feed::walk::Walker::work",
+        168,
+        "stations: STATIONS_MAX",
+    ),
+    (
+        "interp_core::pass::front::crest::CrestSearch::height",
+        3,
+        "steps to the foot of a crest: FOOT_STEPS",
+    ),
+    (
+        "interp_core::pass::step_over::StepOverEstimator::allowed",
+        2,
+        "ends of the gap",
+    ),
+    (
+        "interp_core::sequence::hop::Curves as interp_core::feed::pace::Course::use_at",
+        3,
+        "curves of a hop",
+    ),
+    ("interp_core::sequence::hop::Hop::speed", 3, "curves of a hop"),
+    (
+        "interp_core::sequence::lookahead::stations::widen",
+        3,
+        "axes; derivatives",
+    ),
+    (
+        "interp_core::surface::pole::ReducedCubics::reduce",
+        4,
+        "rows of a block",
+    ),
+    (
+        "interp_core::surface::lines::CoordinateCubics::collapse",
+        4,
+        "rows of a block",
     ),
 ];
 

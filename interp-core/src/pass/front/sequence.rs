@@ -13,7 +13,7 @@ use crate::pass::route::Route;
 use crate::sample::SpanParameter;
 
 /// Cycles of the planning in a period of 1 ms, a share of the period; never less than one portion, nor more than in 1 ms.
-const PORTION_CYCLES: f32 = 26_500.0;
+const PORTION_CYCLES: f32 = 25_000.0;
 const PORTION_PERIOD_S: f32 = 1e-3;
 /// Most portions of a period.
 const PORTIONS_MAX: u8 = 8;

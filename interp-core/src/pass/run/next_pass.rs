@@ -71,7 +71,13 @@ impl Run {
     /// pattern is zigzag.
     fn step_over(&mut self, job: &Job<'_>) -> Result<NextRoute> {
         if let PassPlanning::Fronts(fronts) = &mut self.planning {
-            let next = fronts.next(job)?;
+            if let Some(fault) = self.pending {
+                return Err(fault);
+            }
+            let next = match self.next_route.take() {
+                Some(route) => NextRoute::Pass(route),
+                None => fronts.next(job)?,
+            };
             if let NextRoute::Pass(_) = next {
                 fronts.arrive();
                 self.travel.pass = self.travel.pass.wrapping_add(1);
@@ -108,7 +114,7 @@ impl Run {
     /// Whether [`Self::plan`] has anything to do.
     pub(crate) fn has_to_plan(&self, spacing: Spacing) -> bool {
         match &self.planning {
-            PassPlanning::Fronts(fronts) => fronts.has_work(),
+            PassPlanning::Fronts(fronts) => fronts.has_work() || self.is_front_due(),
             PassPlanning::Scan(scan) => {
                 spacing == Spacing::Exact && (scan.has_work() || self.is_step_due()) || self.is_pass_due()
             }
@@ -148,6 +154,34 @@ impl Run {
             let step = self.find_step_over(job);
             self.step_over = Some(step);
             self.prepare_step_over(job, step);
+        }
+    }
+
+    /// Whether the pass is over, and the next one on a front can be prepared.
+    fn is_front_due(&self) -> bool {
+        match &self.planning {
+            PassPlanning::Fronts(fronts) => {
+                self.travel.next == Next::Over
+                    && self.next_route.is_none()
+                    && self.pending.is_none()
+                    && !fronts.has_work()
+            }
+            PassPlanning::Scan(_) => false,
+        }
+    }
+
+    /// Prepares the next pass of a job of constant scallop height without limits, ahead of the tick that begins it, once the pass is over and its front made.
+    pub(crate) fn prepare_front(&mut self, job: &Job<'_>) {
+        if !self.is_front_due() {
+            return;
+        }
+        match self.next_pass(job) {
+            Ok(NextRoute::Pass(route)) => {
+                self.buffer.prepare(job, &route);
+                self.next_route = Some(route);
+            }
+            Ok(NextRoute::NotYet | NextRoute::None) => {}
+            Err(fault) => self.pending = Some(fault),
         }
     }
 
@@ -315,14 +349,18 @@ impl Run {
         of_region.unwrap_or_else(|| Route::of_pass(job.header, 0, SpanParameter::default()))
     }
 
-    /// A job was loaded: collapses the first patch of its first pass, ahead of the tick that begins it. A fault is left for that tick.
-    pub(crate) fn prepare_start(&mut self, job: &Job<'_>) {
+    /// A job was loaded: begins its first pass, ahead of the tick that starts the run. Returns whether that is done; a fault is left for that tick, and so is
+    /// all of it for a region and a streamed job, whose rows may not be here yet. With limits the first pass is planned, and prepared on the way to it.
+    pub(crate) fn prepare_start(&mut self, job: &Job<'_>) -> bool {
         self.buffer.forget();
-        let is_scanned = matches!(self.planning, PassPlanning::Scan(_));
-        // The rows of a streamed job may not be here yet; with limits the first pass is planned, and prepared on the way to it.
-        if is_scanned && !self.lines.is_in_use() && job.header.window == 0 && job.header.axes.is_none() {
-            let route = self.first_route(job);
-            self.buffer.prepare(job, &route);
+        if self.lines.is_in_use() || job.header.window > 0 || job.header.axes.is_some() {
+            return false;
         }
+        let route = self.first_route(job);
+        let is_begun = self.begin_pass(job, route).is_ok();
+        if is_begun {
+            self.travel.next = Next::Begun;
+        }
+        is_begun
     }
 }

@@ -1,7 +1,6 @@
 //! Where the run is on its pass, for the feed.
 
 use super::Run;
-use crate::job::program::Job;
 use crate::math::arith::{fraction_to_f32, truncated};
 use crate::sample::SpanParameter;
 
@@ -59,9 +58,9 @@ impl Run {
     }
 
     /// Arc to the end of the pass, mm, by Hermite's two-point rule; none before its last piece, and where its end is not evaluated.
-    pub(crate) fn arc_left(&self, job: &Job<'_>) -> Option<f32> {
+    pub(crate) fn arc_left(&self) -> Option<f32> {
         let (travel, patch) = (&self.travel, self.buffer.patch());
-        if !self.is_along() || !patch.has_ends() || travel.route.next(job, &travel.piece).is_some() {
+        if !self.is_along() || !patch.has_end() || !self.buffer.is_last() {
             return None;
         }
         let length = fraction_to_f32(travel.piece.end().checked_sub(travel.fraction)?);

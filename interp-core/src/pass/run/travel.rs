@@ -10,8 +10,10 @@ use crate::surface::{Pass, PathSpeed};
 /// The task of the next tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Next {
-    /// Begin the pass at the current side parameter.
+    /// Begin the first pass.
     Pass,
+    /// Emit the first sample of the first pass, which was begun at load.
+    Begun,
     /// Advance by one period's arc.
     Along,
     /// Find the next pass, and begin it.

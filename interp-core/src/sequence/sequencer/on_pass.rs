@@ -79,7 +79,7 @@ impl Sequencer {
         command: FeedCommand,
         last: &mut Sample,
     ) -> Result<()> {
-        self.correct_progress(job, run);
+        self.correct_progress(run);
         let (now, _) = both(&mut self.plans, self.second);
         let is_over = if now.point {
             if command.feed_factor > 0.0 && run.is_along() {
@@ -196,12 +196,12 @@ impl Sequencer {
 
     /// Corrects the progress at each station by the plan's arc, so that errors do not accumulate from station to station: some periods after it was
     /// measured, because those in which the tool comes to a patch, and the patch after it is prepared, are the worst-case ticks.
-    fn correct_progress(&mut self, job: &Job<'_>, run: &Run) {
+    fn correct_progress(&mut self, run: &Run) {
         let (now, _) = both(&mut self.plans, self.second);
         if self.phase != Phase::Pass || now.point {
             return;
         }
-        if now.route.is_on_front() && self.correct_to_end(job, run) {
+        if now.route.is_on_front() && self.correct_to_end(run) {
             return;
         }
         let (now, _) = both(&mut self.plans, self.second);
@@ -235,13 +235,13 @@ impl Sequencer {
     /// Corrects the progress by the arc left, near the end of a pass on a front: the stations are far apart there, and what is left of their error would be in the
     /// last step. Returns whether it is near.
     #[inline(never)]
-    fn correct_to_end(&mut self, job: &Job<'_>, run: &Run) -> bool {
+    fn correct_to_end(&mut self, run: &Run) -> bool {
         let (now, _) = both(&mut self.plans, self.second);
         let left_q10 = now.plan.length_q10() - self.follower.arc_q10();
         if left_q10 >= END_Q10 {
             return false;
         }
-        let Some(left_mm) = run.arc_left(job) else {
+        let Some(left_mm) = run.arc_left() else {
             return false;
         };
         let apart_q10 = left_q10 - crate::feed::to_q10(left_mm);
