@@ -1,35 +1,35 @@
 //! `run`: loads a job into the firmware, runs it there, and compares the samples with those of the simulation.
 
+mod compare;
+mod connect;
+mod refusals;
+
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use indicatif::ProgressBar;
-use interp_core::{Fault, FaultKind};
-use protocol::message::{Reason, Request};
+use interp_core::FaultKind;
+use protocol::message::Request;
 use serde_json::{Value, json};
 
-use super::attach::unreachable_run;
-use super::flash::{board_of, board_parser};
+use super::flash::board_parser;
 use super::home::{self, PositionNm};
 use super::operate::sentence;
-use super::out::{say, to_stderr};
+use super::out::say;
 use super::outcome::Outcome;
 use super::resume;
 use super::simulate::{WantedReport, remarks, report, surveyed, timed};
-use super::typed::{Console, WORDS};
-use super::{
-    Failure, Result, WantedTrace, begun, completed, progress, read_profile, scripted, spinner, whole,
-};
+use super::{Failure, Result, progress, read_profile, scripted, whole};
 use approach::Kind;
-use inspect::comparison::{self, BoardRun, ComparisonError, Reference};
+use compare::{by_digest, by_sample};
+pub(super) use connect::open_port;
+use connect::{Connected, connect, models_failure};
+use inspect::comparison::{BoardRun, Reference};
 use job::{HeartbeatAction, Job, MachineProfile};
 use machine::prepare::{self, Prepared};
 use machine::profile;
-use machine::remote::chip::{self, Chip, ChipError};
-use machine::remote::operate::{self, Operator, Setup};
-use machine::remote::qemu::{self, Qemu, QemuError};
+use machine::remote::operate::{self, Setup};
 use machine::remote::session::LineLosses;
-use machine::remote::{RemoteError, Session, drive, port};
+use machine::remote::{Session, drive};
 use machine::travel;
 
 /// Runs a job on the firmware and compares every sample with the simulation: in QEMU, on a board, or with a board's image executed on models of
@@ -101,157 +101,6 @@ struct Target {
     port: Option<String>,
 }
 
-impl From<ComparisonError> for Failure {
-    fn from(error: ComparisonError) -> Self {
-        match error {
-            ComparisonError::Remote(error) => error.into(),
-            ComparisonError::Refused(error) => error.into(),
-        }
-    }
-}
-
-impl From<RemoteError> for Failure {
-    fn from(error: RemoteError) -> Self {
-        if let Some(refusal) = unsafe_to(&error).or_else(|| home::elsewhere(&error)) {
-            return Self::Failed(Some(refusal));
-        }
-        let code = match &error {
-            RemoteError::Refused {
-                reason: Reason::Job { fault, .. },
-                ..
-            } => fault.code.to_string(),
-            RemoteError::Refused { reason, .. } => format!("R{}", reason.code()),
-            RemoteError::Version(_) => "R3".to_owned(),
-            _ => return Self::Failed(Some(error.to_string())),
-        };
-        Self::Failed(Some(format!("{error}\n  help: cargo sim explain {code}")))
-    }
-}
-
-/// The text of a refusal for safety, with its remedy.
-fn unsafe_to(error: &RemoteError) -> Option<String> {
-    let RemoteError::Refused {
-        request,
-        reason: Reason::Unsafe { fault },
-    } = error
-    else {
-        return None;
-    };
-    let (what, remedy) = explain::fault(Fault::new(fault.kind()?, fault.value));
-    let code = fault.code;
-    Some(format!(
-        "the board refused {request}: {what}\n  help: {remedy}\n        cargo sim explain {code}"
-    ))
-}
-
-impl From<QemuError> for Failure {
-    fn from(error: QemuError) -> Self {
-        match error {
-            QemuError::Missing => {
-                Self::input(error.to_string(), "install it, or run the job with `simulate`")
-            }
-            QemuError::Firmware(_) | QemuError::Plugin(_) | QemuError::Start(_) => {
-                Self::Failed(Some(error.to_string()))
-            }
-        }
-    }
-}
-
-impl From<ChipError> for Failure {
-    fn from(error: ChipError) -> Self {
-        Self::Failed(Some(error.to_string()))
-    }
-}
-
-/// A session number; it only has to differ from that of the previous session.
-fn session_number() -> u32 {
-    std::time::SystemTime::now()
-        .duration_since(std::time::UNIX_EPOCH)
-        .map_or(1, |now| now.subsec_nanos() ^ std::process::id().rotate_left(16))
-}
-
-/// Opens a session with the board at this serial port.
-pub(super) fn open_port(name: &str) -> Result<Session> {
-    let stream = port::open(name).map_err(|error| {
-        let why = match error {
-            RemoteError::Line(cause) => format!("cannot open it as a serial port: {cause}"),
-            other => other.to_string(),
-        };
-        Failure::input(
-            format!("{name}: {why}"),
-            "name the board's serial port, such as /dev/ttyUSB0",
-        )
-    })?;
-    Ok(Session::open(stream, session_number())?)
-}
-
-/// The process at the other end of the line, if this command started one. It ends when this is dropped.
-enum Peer {
-    Board,
-    Qemu(#[expect(dead_code, reason = "ended when it is dropped")] Qemu),
-    Chip(Chip),
-}
-
-/// A session, with the process at its other end.
-type Connected = (Peer, Session);
-
-/// Starts a board's image on models of its chip.
-fn connect_chip(name: &str, fast: bool) -> Result<Connected> {
-    let bar = spinner("building the firmware and the chip emulator");
-    let built = chip::image(board_of(name)).and_then(|image| Ok((chip::program()?, image)));
-    bar.finish_and_clear();
-    let (program, image) = built?;
-    let (chip, stream) = Chip::start(&program, &image, fast)?;
-    Ok((Peer::Chip(chip), Session::open(stream, session_number())?))
-}
-
-/// Complaints of the models of a chip, and lost bytes; ends the emulator.
-fn models_failure(peer: &mut Peer, as_json: bool) -> Option<String> {
-    let Peer::Chip(chip) = peer else { return None };
-    let Some(said) = chip.end() else {
-        return Some("the chip emulator ended without a report".to_owned());
-    };
-    if !as_json {
-        say!(
-            "  models       {} complaints, {} bytes lost, longest wait of a byte {} cycles",
-            said.complaints.len(),
-            said.bytes_lost,
-            said.byte_wait_max_cycles
-        );
-    }
-    if let Some(first) = said.complaints.first() {
-        return Some(format!("the models of the chip complain: {first}"));
-    }
-    (said.bytes_lost > 0).then(|| format!("{} bytes were lost on the way into the chip", said.bytes_lost))
-}
-
-/// Opens a session with a board, QEMU or an emulated chip.
-fn connect(arguments: &Arguments) -> Result<Connected> {
-    if let Some(name) = &arguments.target.port {
-        return Ok((Peer::Board, open_port(name)?));
-    }
-    if let Some(name) = &arguments.target.chip {
-        return connect_chip(name, arguments.fast);
-    }
-    let image = match &arguments.firmware {
-        Some(image) if !image.exists() => {
-            return Err(Failure::input(
-                format!("there is no {}", image.display()),
-                programs::image_remedy(programs::Part::QemuImage),
-            ));
-        }
-        Some(image) => image.clone(),
-        None => {
-            let bar = spinner("building the firmware");
-            let image = qemu::firmware();
-            bar.finish_and_clear();
-            image?
-        }
-    };
-    let (qemu, stream) = Qemu::start(&image)?;
-    Ok((Peer::Qemu(qemu), Session::open(stream, session_number())?))
-}
-
 /// Position to declare: that of `--home`; without axes (in QEMU, on models of a chip), by default the start of the job.
 fn declared(arguments: &Arguments, prepared: &Prepared) -> Option<PositionNm> {
     let simulated = arguments.target.port.is_none().then(|| home::of(prepared));
@@ -292,71 +141,6 @@ fn check_period(job: &Job, session: &Session) -> Result<()> {
             "set period_us to that of the board, or build the firmware for another period",
         )
         .into())
-}
-
-/// Runs and compares the digest of each pass; where one differs in QEMU, finds the first sample that does.
-fn by_digest(arguments: &Arguments, reference: &Reference<'_>, session: &mut Session) -> Result<BoardRun> {
-    let bar = progress(reference.run.samples, "running");
-    let mut console = console(arguments, &bar, reference.job.machine.has_limits());
-    let operator = console.as_mut().map(|console| console as &mut dyn Operator);
-    let run = comparison::by_digest(reference, session, arguments.target.qemu, operator, |samples| {
-        bar.set_position(samples)
-    });
-    bar.finish_and_clear();
-    run.map_err(|error| left(error, arguments, reference.job))
-}
-
-/// The failure of a comparison: on a board the run goes on, or is held.
-fn left(error: ComparisonError, arguments: &Arguments, job: &Job) -> Failure {
-    match (error, &arguments.target.port) {
-        (ComparisonError::Remote(error), Some(port)) => unreachable_run(error, port, Some(&job.machine)),
-        (error, _) => error.into(),
-    }
-}
-
-/// The operator's console of a run on a board; QEMU has none.
-fn console(arguments: &Arguments, bar: &ProgressBar, has_limits: bool) -> Option<Console> {
-    if arguments.target.qemu {
-        return None;
-    }
-    if !arguments.json {
-        bar.suspend(|| to_stderr(format_args!("type a command and Enter: {WORDS}")));
-    }
-    Some(Console::new(bar.clone(), Some(has_limits)))
-}
-
-/// Runs with every sample on the line, writes the trace, and compares each sample.
-fn by_sample(arguments: &Arguments, reference: &Reference<'_>, session: &mut Session) -> Result<BoardRun> {
-    let wanted = WantedTrace::new(arguments.trace.as_ref(), arguments.force);
-    let (mut file, whole) = begun(wanted, reference.job)?;
-    let mut written = Ok(());
-    let bar = progress(reference.run.samples, "running");
-    let mut console = console(arguments, &bar, reference.job.machine.has_limits());
-    let operator = console.as_mut().map(|console| console as &mut dyn Operator);
-    let length = reference.run.samples;
-    let run = comparison::by_sample(
-        reference,
-        session,
-        arguments.target.qemu,
-        operator,
-        |samples| {
-            if samples % 4096 == 0 {
-                bar.set_position(samples.min(length));
-            }
-        },
-        |sample| {
-            if let (Some(file), Ok(())) = (&mut file, &written) {
-                written = file.write(&inspect::plain(reference.prepared, sample));
-            }
-        },
-    );
-    bar.finish_and_clear();
-    let run = run.map_err(|error| left(error, arguments, reference.job))?;
-    // Otherwise no file is left behind.
-    if run.is_complete() {
-        completed(written, file, whole, wanted)?;
-    }
-    Ok(run)
 }
 
 /// A machine, as a job needs it before it is computed.
