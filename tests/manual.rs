@@ -4,8 +4,8 @@ mod rig;
 
 use interp_core::steps::StepConfig;
 use protocol::message::{
-    Activity, Configuration, Homing, InputLines, JogWay, MotionEnd, NO_AXIS, Offsets, Profile, Reason,
-    Request,
+    Activity, Configuration, DoorContact, Homing, InputLines, JogWay, MotionEnd, NO_AXIS, Offsets, Profile,
+    Reason, Request,
 };
 
 use rig::{Fault, Rig};
@@ -35,20 +35,26 @@ pub(crate) fn profile() -> Profile {
         probe_inverted: false,
         step_inverted: 0,
         enable_inverted: 0,
+        door: DoorContact::None,
         spindle: None,
     }
 }
 
-fn jog(axis: u8, way: JogWay) -> Request {
+fn jog(way: JogWay) -> Request {
     Request::Jog {
-        axis,
         way,
         speed_mm_s: 1000.0,
     }
 }
 
-fn by(axis: u8, mm: i32) -> Request {
-    jog(axis, JogWay::By { nm: mm * MM })
+fn by(axis: usize, mm: i32) -> Request {
+    let mut nm = [0; 3];
+    nm[axis] = mm * MM;
+    jog(JogWay::By { nm })
+}
+
+fn towards(signs: [i8; 3]) -> Request {
+    jog(JogWay::Towards { signs })
 }
 
 const HOME: Request = Request::Home { axes: 0 };
@@ -193,7 +199,12 @@ fn a_jog_goes_its_distance_within_the_travel() {
         matches!(refused, Reason::BeyondTravel { axis: 2, .. }),
         "{refused}"
     );
-    assert!(matches!(rig.ask(&by(3, 1)), Err(Reason::OutOfRange { .. })));
+    let probe = Request::Probe {
+        axis: 3,
+        nm: 1,
+        speed_mm_s: 1.0,
+    };
+    assert!(matches!(rig.ask(&probe), Err(Reason::OutOfRange { .. })));
     // Stopped by the operator: along the ramp, and the position stays known.
     rig.ask(&by(0, 250)).unwrap();
     rig.rest(500);
@@ -214,7 +225,7 @@ fn a_continuous_jog_ends_with_its_repetition_and_at_the_travels_end() {
     rig.until_rest();
     // Kept going for a second, at 30 repetitions a second.
     for _ in 0..30 {
-        rig.ask(&jog(0, JogWay::Plus)).unwrap();
+        rig.ask(&towards([1, 0, 0])).unwrap();
         rig.rest(32);
     }
     let motion = rig.until_rest();
@@ -225,7 +236,7 @@ fn a_continuous_jog_ends_with_its_repetition_and_at_the_travels_end() {
     );
     // Held: to the end of the travel, exactly.
     for _ in 0..200 {
-        match rig.ask(&jog(0, JogWay::Plus)) {
+        match rig.ask(&towards([1, 0, 0])) {
             Ok(()) => rig.rest(32),
             Err(other) => panic!("{other}"),
         }
@@ -359,4 +370,149 @@ fn offsets_are_kept_through_a_power_cut() {
     let mut rig = rig.power_cycle();
     assert_eq!(rig.offsets(), offsets);
     assert_eq!(offsets.origin_nm(1), Some([-4, 5, -12_351]));
+}
+
+/// Two axes at once: a straight line to a step, and each axis within its own limits.
+#[test]
+fn a_jog_of_two_axes_is_a_straight_line() {
+    let mut rig = Rig::homable([100 * MM, 100 * MM, -30 * MM]);
+    rig.ask(&HOME).unwrap();
+    let [x, y, z] = rig.until_rest().at_nm;
+    let nm = [90 * MM, 30 * MM, -15 * MM];
+    rig.ask(&jog(JogWay::By { nm })).unwrap();
+    let mut before = [[x, y, z]; 3];
+    loop {
+        rig.rest(1);
+        let motion = rig.motion();
+        let at = motion.at_nm;
+        let way = [at[0] - x, at[1] - y, at[2] - z];
+        assert!(
+            (way[0] - 3 * way[1]).abs() <= 6 && (way[1] + 2 * way[2]).abs() <= 4,
+            "{way:?}"
+        );
+        for (axis, (most, jerk)) in [(100.0, 20_000.0), (100.0, 20_000.0), (50.0, 10_000.0)]
+            .into_iter()
+            .enumerate()
+        {
+            // A request takes a period of its own, so positions are two periods apart.
+            let speed = f64::from(at[axis] - before[2][axis]).abs() / 2.0 * 1e-3;
+            assert!(speed <= most + 0.01, "{speed} mm/s");
+            let third = at[axis] - 3 * before[2][axis] + 3 * before[1][axis] - before[0][axis];
+            assert!(f64::from(third).abs() / 8.0 <= jerk * 1e-3 + 8.0, "{third}");
+        }
+        before = [before[1], before[2], at];
+        if motion.activity == Activity::Rest {
+            assert_eq!((motion.end, motion.axes), (MotionEnd::Done, 0b111));
+            break;
+        }
+    }
+    rig.rest(5);
+    for (axis, (really, by)) in rig.stands_nm().into_iter().zip(nm).enumerate() {
+        let from = [x, y, z][axis];
+        assert!((really - from - by).abs() <= STEP_NM + 1_000, "{axis}");
+    }
+}
+
+/// Held diagonally against the end of x: the line ends there, and the next key goes on along y alone.
+#[test]
+fn a_continuous_diagonal_ends_where_one_of_its_axes_ends() {
+    let mut rig = Rig::homable([100 * MM, 100 * MM, -30 * MM]);
+    rig.ask(&HOME).unwrap();
+    rig.until_rest();
+    rig.ask(&by(0, 289)).unwrap();
+    rig.until_rest();
+    let hold = |rig: &mut Rig| {
+        for _ in 0..60 {
+            rig.ask(&towards([1, 1, 0])).unwrap();
+            rig.rest(32);
+        }
+        rig.until_rest().at_nm
+    };
+    let [x, y, _] = hold(&mut rig);
+    assert_eq!(x, 300 * MM);
+    assert!(y > 11 * MM, "{y}: to the end of x diagonally, then along y");
+    // In another direction it does not count as the same jog.
+    rig.ask(&towards([-1, 1, 0])).unwrap();
+    assert_eq!(rig.ask(&towards([-1, -1, 0])), Err(Reason::Moving));
+    assert_eq!(rig.until_rest().end, MotionEnd::HostGone);
+}
+
+#[test]
+fn the_feed_override_holds_for_jogs() {
+    let mut periods = [0; 2];
+    for (periods, percent) in periods.iter_mut().zip([100, 25]) {
+        let mut rig = Rig::homable([100 * MM, 100 * MM, -30 * MM]);
+        rig.ask(&Request::Override { percent }).unwrap();
+        rig.ask(&Request::Jog {
+            way: JogWay::By { nm: [80 * MM, 0, 0] },
+            speed_mm_s: 40.0,
+        })
+        .unwrap();
+        *periods = rig.until_rest().periods;
+        rig.ask(&Request::Override { percent: 0 }).unwrap();
+        assert_eq!(rig.ask(&by(0, 1)), Err(Reason::NoFeed));
+    }
+    // 40 and 10 mm/s over 80 mm, and the ramps: 0.09 and 0.045 s.
+    assert_eq!(periods.map(|periods| periods / 100), [20, 80], "{periods:?}");
+}
+
+/// A machine with a door.
+fn with_door(contact: DoorContact) -> Rig {
+    let mut rig = Rig::new([100 * MM, 100 * MM, -30 * MM]);
+    let door = Profile {
+        door: contact,
+        ..profile()
+    };
+    rig.ask(&Request::SetProfile(Some(door))).unwrap();
+    rig.ask(&Request::Drives { on: true }).unwrap();
+    rig.rest(10);
+    rig
+}
+
+#[test]
+fn an_open_door_stops_a_jog_and_then_allows_a_slow_one() {
+    let mut rig = with_door(DoorContact::NormallyClosed);
+    rig.ask(&by(0, 150)).unwrap();
+    rig.rest(500);
+    rig.pressed = InputLines::DOOR;
+    let motion = rig.until_rest();
+    assert_eq!(motion.end, MotionEnd::Door);
+    // Along its ramp: 100 mm/s at 1000 mm/s^2 take about 10 mm.
+    let gone = motion.at_nm[0];
+    assert!((40 * MM..70 * MM).contains(&gone), "{gone}");
+    assert!(rig.status().safety.drives_on);
+    rig.ask(&by(0, 66)).unwrap();
+    let motion = rig.until_rest();
+    assert_eq!(motion.end, MotionEnd::Done);
+    // 33 mm/s.
+    assert!((2_000..2_100).contains(&motion.periods), "{}", motion.periods);
+    rig.pressed = InputLines::NONE;
+    rig.rest(10);
+    rig.ask(&by(0, -66)).unwrap();
+    let motion = rig.until_rest();
+    assert!(
+        motion.end == MotionEnd::Done && motion.periods < 1_000,
+        "{motion:?}"
+    );
+}
+
+/// Without [door] in the profile the input is not read; the other contact means the opposite.
+#[test]
+fn the_doors_contact_is_that_of_the_profile() {
+    for (contact, pressed, is_open) in [
+        (DoorContact::None, InputLines::DOOR, false),
+        (DoorContact::NormallyClosed, InputLines::DOOR, true),
+        (DoorContact::NormallyClosed, InputLines::NONE, false),
+        (DoorContact::NormallyOpen, InputLines::DOOR, false),
+        (DoorContact::NormallyOpen, InputLines::NONE, true),
+    ] {
+        let mut rig = with_door(contact);
+        rig.pressed = pressed;
+        rig.rest(10);
+        assert_eq!(
+            rig.status().safety.lines.has(InputLines::DOOR),
+            is_open,
+            "{contact:?}"
+        );
+    }
 }

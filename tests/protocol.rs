@@ -18,11 +18,11 @@ use proptest::prelude::*;
 use protocol::{
     frame::{Decoder, FRAME_MAX, FrameError, write_reply},
     message::{
-        Activity, Batch, Capabilities, Clock, Configuration, Description, Excess, FaultReport, Homing,
-        InputLines, JogWay, Journal, LinkTimeoutAction, MotionEnd, MotionStatus, Offsets, PassDigest,
-        Profile, ProfileLimit, Reason, Reply, Report, Request, ResetCause, SafetyStatus, SampleRecord,
-        SpindleOrder, SpindleSettings, Status, StepSettings, StreamStatus, Turning, Words, read_reply,
-        read_request,
+        Activity, AtSpeed, Batch, Capabilities, Clock, Configuration, Description, DoorContact, Excess,
+        FaultReport, Homing, InputLines, JogWay, Journal, LinkTimeoutAction, MotionEnd, MotionStatus,
+        Offsets, PassDigest, PauseCause, Profile, ProfileLimit, Reason, Reply, Report, Request, ResetCause,
+        SafetyStatus, SampleRecord, SpindleOrder, SpindleSettings, Status, StepSettings, StreamStatus,
+        Turning, Words, read_reply, read_request,
     },
 };
 
@@ -85,7 +85,9 @@ fn profile() -> Profile {
             max_rpm: 24_000,
             at_speed_ticks: 3_000,
             stops_at_pause: true,
+            at_speed: AtSpeed::Opens,
         }),
+        door: DoorContact::NormallyClosed,
     }
 }
 
@@ -145,13 +147,11 @@ fn requests() -> Vec<Request> {
         Request::SetProfile(Some(profile())),
         Request::SetProfile(None),
         Request::Jog {
-            axis: 2,
-            way: JogWay::By { nm: -300 },
+            way: JogWay::By { nm: [0, 64, -300] },
             speed_mm_s: 12.5,
         },
         Request::Jog {
-            axis: 0,
-            way: JogWay::Minus,
+            way: JogWay::Towards { signs: [-1, 0, 1] },
             speed_mm_s: 12.5,
         },
         Request::Home { axes: 5 },
@@ -171,6 +171,11 @@ fn requests() -> Vec<Request> {
         Request::Pause,
         Request::StartAt { pass: 300 },
         Request::Journal,
+        Request::Turn {
+            turning: Turning::Clockwise,
+            rpm: 300,
+        },
+        Request::Coolant { on: true },
         Request::JobBegin {
             header: Header {
                 axes: Some(axes()),
@@ -247,6 +252,12 @@ fn status() -> Status {
             feed_override: 150,
             configuration: CONFIGURATION,
             reset: ResetCause::Watchdog,
+            pause: PauseCause::Door,
+            spindle: SpindleOrder {
+                turning: Turning::Clockwise,
+                rpm: 300,
+                coolant: true,
+            },
         },
     }
 }
@@ -328,6 +339,8 @@ fn reasons() -> Vec<Reason> {
         Reason::NoSpindle,
         Reason::RowsGone,
         Reason::WholeOnly,
+        Reason::SpindleTurns,
+        Reason::NoFeed,
     ]
 }
 
@@ -386,7 +399,7 @@ fn replies() -> Vec<Reply> {
             number: 6,
             motion: MotionStatus {
                 activity: Activity::Approach,
-                axis: 2,
+                axes: 0b101,
                 at_nm: [1, -2, 300],
                 homed_axes: 3,
                 end: MotionEnd::WrongSwitch,

@@ -9,7 +9,9 @@ use interp_core::{State, steps::AxisSteps, steps::StepConfig};
 use job::{Job, Pattern};
 use machine::prepare::{Prepared, prepare};
 use protocol::digest::job_digest;
-use protocol::message::{Configuration, Journal, Profile, Reason, Reply, Request, Status, job_mark};
+use protocol::message::{
+    Configuration, DoorContact, Journal, Profile, Reason, Reply, Request, Status, job_mark,
+};
 
 use crate::pause::sample_job;
 
@@ -46,6 +48,7 @@ fn profile(job: &Job) -> Profile {
         spindle: None,
         step_inverted: 0,
         enable_inverted: 0,
+        door: DoorContact::None,
     }
 }
 

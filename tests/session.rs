@@ -140,7 +140,7 @@ fn nothing_is_done_before_hello() {
 fn another_version_is_told_both() {
     let mut line = Line::default();
     let Reply::Capabilities(capabilities) = line.ask(&Request::Hello {
-        version: 9,
+        version: PROTOCOL_VERSION + 1,
         session: 1,
     }) else {
         panic!("no capabilities");
@@ -153,7 +153,7 @@ fn another_version_is_told_both() {
         assert_eq!(
             line.refused(&request),
             Reason::Version {
-                host: 9,
+                host: PROTOCOL_VERSION + 1,
                 board: PROTOCOL_VERSION
             }
         );

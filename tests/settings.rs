@@ -7,8 +7,8 @@ use interp_core::{
     steps::{AxisSteps, StepConfig},
 };
 use protocol::message::{
-    Configuration, Excess, LinkTimeoutAction, Profile, ProfileLimit, Reason, Reply, Request, Status,
-    StepSettings,
+    Configuration, DoorContact, Excess, LinkTimeoutAction, Profile, ProfileLimit, Reason, Reply, Request,
+    Status, StepSettings,
 };
 
 const WORDS: usize = 64;
@@ -41,6 +41,7 @@ fn profile() -> Profile {
         probe_inverted: false,
         step_inverted: 0,
         enable_inverted: 0,
+        door: DoorContact::None,
         spindle: None,
     }
 }

@@ -14,7 +14,7 @@
 //!
 //! **Inputs are fail-safe.** Switches are normally closed and pull their pin to ground; a switch opens when it is
 //! pressed, and the pull-up then makes the pin high, as with a broken wire or a disconnected plug. So the active level of
-//! every input is [`Level::High`]. Unused inputs are bridged to ground.
+//! every input is [`Level::High`], but for the contact that reports the spindle's speed: it closes, so that a broken wire is no speed. Unused inputs are bridged to ground.
 #![no_std]
 
 pub mod setup;
@@ -215,6 +215,10 @@ pub enum Role {
     DriveFault,
     /// Input: active when the probe touches.
     Probe,
+    /// Input: active when the safety door is open.
+    Door,
+    /// Input: active when the spindle is at speed.
+    AtSpeed,
     /// Output: active while the spindle turns.
     SpindleEnable,
     /// Output: active while it turns counterclockwise.
@@ -253,6 +257,8 @@ impl Role {
             Self::SpindleDirection => 23,
             Self::SpindleSpeed => 24,
             Self::Coolant => 25,
+            Self::Door => 26,
+            Self::AtSpeed => 27,
         }
     }
 
@@ -266,6 +272,8 @@ impl Role {
                 | Self::EmergencyStop
                 | Self::DriveFault
                 | Self::Probe
+                | Self::Door
+                | Self::AtSpeed
                 | Self::SerialRx
         )
     }
@@ -282,6 +290,8 @@ impl core::fmt::Display for Role {
             Self::EmergencyStop => f.write_str("emergency stop"),
             Self::DriveFault => f.write_str("drive fault"),
             Self::Probe => f.write_str("probe"),
+            Self::Door => f.write_str("safety door"),
+            Self::AtSpeed => f.write_str("spindle at speed"),
             Self::SpindleEnable => f.write_str("spindle"),
             Self::SpindleDirection => f.write_str("spindle, counterclockwise"),
             Self::SpindleSpeed => f.write_str("spindle speed (PWM)"),

@@ -10,7 +10,7 @@
 //!   with normally closed switches, it is lit when the limit is reached. The sockets E0, E1, E2 take the upper ends.
 //! - Emergency stop and drive fault are on the header EXTENSION-1, which nothing else uses: PC9 is next to ground, so that a
 //!   two-pole plug fits. The header has no filter; the chip's pull-up (40 kOhm) holds the line.
-//! - The probe is on EXP1, whose pin 2 is ground: its port is one that each tick reads anyway.
+//! - Probe, safety door and the spindle's contact are on EXP1, whose pin 2 is ground: their port is one that each tick reads anyway.
 //! - The spindle is on EXP1 and EXP2, 3.3 V: enable and direction, and PB15 as the only free output of a timer that nothing else uses. FAN0 switches the coolant.
 //! - USART1 is on the TFT socket, at 3.3 V. USB goes to the OTG port, which this firmware does not use.
 //! - The LED D13 is connected to PA7 through 1 kOhm and is lit while the pin is high.
@@ -26,8 +26,8 @@ use crate::{
     Line, Loader, Package,
     Port::{A, B, C, D, E, F, G},
     Role::{
-        Coolant, Direction, DriveFault, EmergencyStop, Enable, LimitMax, LimitMin, Parked, Probe, SerialRx,
-        SerialTx, SpindleDirection, SpindleEnable, SpindleSpeed, StatusLed, Step,
+        AtSpeed, Coolant, Direction, Door, DriveFault, EmergencyStop, Enable, LimitMax, LimitMin, Parked,
+        Probe, SerialRx, SerialTx, SpindleDirection, SpindleEnable, SpindleSpeed, StatusLed, Step,
     },
 };
 
@@ -69,6 +69,8 @@ pub const SKR_PRO: Board = Board {
         Line::new(EmergencyStop, C, 9, High, "EXTENSION-1, beside GND"),
         Line::new(DriveFault, C, 4, High, "EXTENSION-1, fourth of GND's row"),
         Line::new(Probe, G, 2, High, "EXP1, pin 6"),
+        Line::new(Door, G, 7, High, "EXP1, pin 3"),
+        Line::new(AtSpeed, G, 4, Low, "EXP1, pin 10"),
         Line::new(SpindleEnable, G, 3, High, "EXP1, pin 5"),
         Line::new(SpindleDirection, G, 6, High, "EXP1, pin 4"),
         Line::new(SpindleSpeed, B, 15, High, "EXP2, pin 5"),

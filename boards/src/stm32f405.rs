@@ -11,8 +11,8 @@ use crate::{
     Line, Package,
     Port::{A, B, C},
     Role::{
-        Coolant, Direction, DriveFault, EmergencyStop, Enable, LimitMax, LimitMin, Probe, SerialRx, SerialTx,
-        SpindleDirection, SpindleEnable, SpindleSpeed, StatusLed, Step,
+        AtSpeed, Coolant, Direction, Door, DriveFault, EmergencyStop, Enable, LimitMax, LimitMin, Probe,
+        SerialRx, SerialTx, SpindleDirection, SpindleEnable, SpindleSpeed, StatusLed, Step,
     },
 };
 
@@ -51,6 +51,8 @@ pub const STM32F405: Board = Board {
         Line::new(EmergencyStop, B, 10, High, "the pin"),
         Line::new(DriveFault, B, 11, High, "the pin"),
         Line::new(Probe, C, 4, High, "the pin"),
+        Line::new(Door, C, 5, High, "the pin"),
+        Line::new(AtSpeed, B, 0, Low, "the pin"),
         Line::new(SpindleEnable, C, 9, High, "the pin"),
         Line::new(SpindleDirection, C, 10, High, "the pin"),
         Line::new(SpindleSpeed, B, 15, High, "the pin"),

@@ -37,6 +37,8 @@ fn roles() -> Vec<Role> {
         Role::EmergencyStop,
         Role::DriveFault,
         Role::Probe,
+        Role::Door,
+        Role::AtSpeed,
         Role::SpindleEnable,
         Role::SpindleDirection,
         Role::SpindleSpeed,
@@ -99,10 +101,13 @@ fn steps_are_on_one_port() {
 #[test]
 fn inputs_fail_to_the_safe_side() {
     for board in BOARDS {
-        assert_eq!(inputs(board).count(), 9);
+        assert_eq!(inputs(board).count(), 11);
         for line in inputs(board) {
-            assert_eq!(line.active, Level::High, "{}: {}", board.id, line.role);
-            assert!(line.is_active(line.pin.bit()) && !line.is_active(!line.pin.bit()));
+            // An open circuit pulls the pin up: a stop, an open door, a touch, and no speed.
+            let is_safe = line.role != Role::AtSpeed;
+            assert_eq!(line.active == Level::High, is_safe, "{}: {}", board.id, line.role);
+            assert_eq!(line.is_active(line.pin.bit()), is_safe);
+            assert_eq!(line.is_active(!line.pin.bit()), !is_safe);
         }
         let number = board.line(Role::EmergencyStop).pin.number;
         let sharing = inputs(board).filter(|line| line.pin.number == number).count();

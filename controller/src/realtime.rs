@@ -14,6 +14,7 @@
 //! **Inputs.** Evaluated in every tick of the timer, in lockstep also between periods; see [`crate::safety`].
 
 mod control;
+mod pause;
 mod run;
 mod start;
 
@@ -25,7 +26,9 @@ use interp_core::{
     sample::{Sample, State},
     steps::{BUFFER_WORDS, CheckedSteps, Steps},
 };
-use protocol::message::{Clock, FaultReport, InputLines, Report, ResetCause, Status, StreamStatus};
+use protocol::message::{
+    Clock, FaultReport, InputLines, Report, ResetCause, SafetyStatus, Status, StreamStatus,
+};
 
 use self::{
     control::{Control, Planning},
@@ -229,12 +232,14 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
     #[inline(never)]
     fn guard(&mut self, lines: InputLines, events: &mut impl Events) {
         let under_way = self.interpolator.state().is_under_way();
+        let before = self.control.safety.status().lines;
         match self.control.safety.watch(lines, under_way) {
             Some(Stop::Uncontrolled(fault)) => self.interpolator.uncontrolled_stop(fault),
             Some(Stop::Controlled(fault)) => self.interpolator.controlled_stop(fault),
             None => {}
         }
         let steady = self.control.safety.status().lines;
+        self.pause_by_inputs(before, steady);
         if !self.control.safety.drives_on() {
             self.control.manual.drives_are_off(steady);
             self.control.spindle.off();
@@ -254,6 +259,9 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
                 self.end_run(events);
             }
             self.control.safety.recheck();
+        }
+        if self.control.safety.has_timed_out() && self.control.spindle.is_commanded() {
+            self.control.spindle.off();
         }
         let state = self.interpolator.state();
         let holds = self.control.command.is_none() && Command::Hold.is_allowed(state);
@@ -473,13 +481,16 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
                 room,
                 starved: run.starved,
             },
-            safety: self.control.safety.status(),
+            safety: SafetyStatus {
+                spindle: self.control.spindle.now(),
+                ..self.control.safety.status()
+            },
         }
     }
 
     /// Reports a sign of life of the host.
     pub const fn heard(&mut self) {
-        self.control.safety.heard();
+        self.control.safety.heard(self.control.spindle.is_commanded());
         self.control.manual.heard();
     }
 

@@ -11,20 +11,21 @@
 //! **Drive fault.** The same, after debouncing.
 //! **Limit switch.** After debouncing: controlled stop along the path. The position stays valid, and nothing is latched, but no
 //! run starts while a switch is asserted.
+//! **Safety door.** After debouncing: a run pauses, leaving the surface, and resumes only when the door is shut. Nothing is latched.
 //! **Drives.** Off after power-up; on only by an order of the host, and never while emergency stop or drive fault is asserted or latched.
 //! Emergency stop and drive fault switch them off; the host can switch them off except during a run.
 //! **Home.** There are no encoders: the axes are homed by their switches ([`crate::manual`]), or the operator places them, switches the drives on, and
 //! declares their position. Without drives the axes may move, so every switch-off of the drives clears the home, unless the profile says that it survives.
 //! **Cost.** A tick with unchanged inputs takes one comparison and one count (`is_unchanged`).
 
-use crate::manual::{Motion, Setup};
+use crate::manual::{HEARD_TICKS, Motion, Setup};
 use interp_core::{
     fault::{Fault, FaultKind},
     sample::State,
 };
 use protocol::message::{
-    Clock, Configuration, InputLines, LinkTimeoutAction, OVERRIDE_MAX_PERCENT, Reason, ResetCause,
-    SafetyStatus, SpindleOrder,
+    Clock, Configuration, InputLines, LinkTimeoutAction, OVERRIDE_MAX_PERCENT, PauseCause, Reason,
+    ResetCause, SafetyStatus, SpindleOrder, Turning,
 };
 
 /// Debounce: consecutive ticks for which an input has to differ before it is accepted, and before the emergency stop counts as released. At 1 ms, the
@@ -33,6 +34,9 @@ pub const DEBOUNCE_TICKS: u32 = 3;
 
 /// A value that no inputs can have, so that the next tick is evaluated although the inputs have not changed.
 const UNSETTLED: u32 = u32::MAX;
+
+/// Inputs that only a machine with a profile has.
+const OPTIONAL: InputLines = InputLines::DOOR.or(InputLines::AT_SPEED);
 
 /// The host's orders for drives and home. Executed at once, under the lock of the real-time half, so that no tick comes between
 /// check and execution.
@@ -44,6 +48,18 @@ pub enum Order {
     Move(Motion),
     /// Spindle and coolant of the loaded job.
     Spindle(SpindleOrder),
+    /// The spindle, outside a run.
+    Turn {
+        /// How it turns.
+        turning: Turning,
+        /// Speed, 1/min.
+        rpm: u32,
+    },
+    /// The coolant.
+    Coolant {
+        /// Whether to switch it on.
+        on: bool,
+    },
     /// The pass with which the next run begins.
     BeginAt(u32),
     /// Configuration of the machine.
@@ -71,7 +87,7 @@ pub(crate) enum Stop {
     Controlled(Fault),
 }
 
-/// Twelve two-bit vertical counters: bit n of both words is the count of input n.
+/// Sixteen two-bit vertical counters: bit n of both words is the count of input n.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Debounce {
     steady: u16,
@@ -115,8 +131,9 @@ pub(crate) struct Safety {
     ticks_to_timeout: u32,
     status: SafetyStatus,
     debounce: Debounce,
-    /// Inputs whose level means the opposite.
+    /// Inputs whose level means the opposite, and inputs that are not read.
     inverted: InputLines,
+    ignored: InputLines,
     home_survives_off: bool,
     home_nm: [i32; 3],
     /// Whether the end of a run is still to be reported.
@@ -130,6 +147,7 @@ impl Safety {
         status: SafetyStatus::DEFAULT,
         debounce: Debounce::NEW,
         inverted: InputLines::NONE,
+        ignored: OPTIONAL,
         home_survives_off: false,
         home_nm: [0; 3],
         ending: false,
@@ -193,17 +211,16 @@ impl Safety {
 
     /// The asserted inputs, as read.
     pub(crate) const fn raw(&self, lines: InputLines) -> InputLines {
-        InputLines(lines.0 ^ self.inverted.0).and(InputLines::ALL)
+        InputLines(lines.0 ^ self.inverted.0)
+            .and(InputLines::ALL)
+            .without(self.ignored)
     }
 
-    /// Puts the profile's part in force: the meaning of the probe's level, and whether the home survives drives that are off.
+    /// Puts the profile's part in force: the meaning of the inputs' levels, and whether the home survives drives that are off.
     pub(crate) fn set_up(&mut self, setup: Option<&Setup>) {
         self.home_survives_off = setup.is_some_and(Setup::home_survives_off);
-        self.inverted = if setup.is_some_and(Setup::probe_is_inverted) {
-            InputLines::PROBE
-        } else {
-            InputLines::NONE
-        };
+        self.inverted = setup.map_or(InputLines::NONE, Setup::inverted);
+        self.ignored = setup.map_or(OPTIONAL, Setup::ignored);
         self.recheck();
     }
 
@@ -228,12 +245,18 @@ impl Safety {
         self.settled = UNSETTLED;
     }
 
-    /// Reports a sign of life of the host.
-    pub(crate) const fn heard(&mut self) {
+    /// Reports a sign of life of the host. `is_commanded`: something is on for as long as the host is heard.
+    pub(crate) const fn heard(&mut self, is_commanded: bool) {
         self.ticks_to_timeout = match self.status.configuration.link_timeout_ticks {
+            _ if is_commanded => HEARD_TICKS,
             0 => u32::MAX,
             ticks => ticks,
         };
+    }
+
+    /// Whether the host was not heard for too long, before [`Self::check_link_timeout`].
+    pub(crate) const fn has_timed_out(&self) -> bool {
+        self.ticks_to_timeout == 0
     }
 
     /// After a tick for which [`Self::is_unchanged`] was false: whether the link timeout requires a hold now.
@@ -242,7 +265,7 @@ impl Safety {
         if self.ticks_to_timeout != 0 {
             return false;
         }
-        self.heard();
+        self.heard(false);
         if clock != Clock::Free || !state.is_under_way() || self.status.configuration.link_timeout_ticks == 0
         {
             return false;
@@ -261,6 +284,12 @@ impl Safety {
     /// Reports the start of a run.
     pub(crate) const fn begin_run(&mut self) {
         self.status.link_timed_out = false;
+        self.status.pause = PauseCause::None;
+    }
+
+    /// The board pauses a run by itself; `None`: it goes on.
+    pub(crate) const fn set_pause(&mut self, cause: PauseCause) {
+        self.status.pause = cause;
     }
 
     /// Sets the feed override, percent.
@@ -277,10 +306,12 @@ impl Safety {
                 no_hindrance(self.status.lines.and(stops))?;
                 self.status.latched = InputLines::NONE;
             }
+            // Also in a run.
+            Order::Coolant { .. } => {}
             _ if under_way => return Err(Reason::WrongState { state }),
             Order::Configure(configuration) => {
                 self.status.configuration = configuration;
-                self.heard();
+                self.heard(false);
             }
             Order::Drives { on: false } => {
                 self.status.drives_on = false;
@@ -298,7 +329,7 @@ impl Safety {
                 self.home_nm = home_nm;
                 self.status.homed = true;
             }
-            Order::SetUp(_) | Order::Spindle(_) | Order::BeginAt(_) => {}
+            Order::SetUp(_) | Order::Spindle(_) | Order::Turn { .. } | Order::BeginAt(_) => {}
             Order::Move(_) => self.may_move()?,
         }
         Ok(())
@@ -335,6 +366,7 @@ fn may_drive(status: &SafetyStatus) -> Result<(), Reason> {
 /// The reason of the refusal: an input asserted or latched, the drives off, the machine not homed.
 pub fn may_start(status: &SafetyStatus) -> Result<(), Reason> {
     no_hindrance(status.latched.or(status.lines))?;
+    may_resume(status)?;
     if !status.drives_on {
         return Err(Reason::DrivesOff);
     }
@@ -343,6 +375,18 @@ pub fn may_start(status: &SafetyStatus) -> Result<(), Reason> {
         return Err(Reason::Unsafe { fault: fault.into() });
     }
     Ok(())
+}
+
+/// Whether the safety door lets a run resume, and the spindle turn.
+///
+/// # Errors
+/// It is open.
+pub fn may_resume(status: &SafetyStatus) -> Result<(), Reason> {
+    if !status.lines.has(InputLines::DOOR) {
+        return Ok(());
+    }
+    let fault = Fault::new(FaultKind::DoorOpen, f32::from(InputLines::DOOR.0));
+    Err(Reason::Unsafe { fault: fault.into() })
 }
 
 #[cfg(test)]

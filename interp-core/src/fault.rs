@@ -57,11 +57,15 @@ pub enum FaultKind {
     /// The step pulses were not output in time, or the step timer or its DMA has stopped.
     /// Value: slots of the period that had elapsed when the direction was set too late; otherwise 0.
     StepOutput = 22,
+    /// The spindle did not report its speed in time. Value: the speed ordered, 1/min.
+    SpindleSpeed = 23,
+    /// A start or resume while the safety door is open. Value: the input, as a bit.
+    DoorOpen = 24,
 }
 
 impl FaultKind {
     /// Every kind, in order of its code.
-    pub const ALL: [Self; 22] = [
+    pub const ALL: [Self; 24] = [
         Self::BallDoesNotFit,
         Self::DegenerateSurface,
         Self::ParameterBackwards,
@@ -84,6 +88,8 @@ impl FaultKind {
         Self::NotHomed,
         Self::StepRate,
         Self::StepOutput,
+        Self::SpindleSpeed,
+        Self::DoorOpen,
     ];
 
     /// The stable code.
@@ -124,6 +130,8 @@ impl FaultKind {
             Self::NotHomed => "not-homed",
             Self::StepRate => "step-rate",
             Self::StepOutput => "step-output",
+            Self::SpindleSpeed => "spindle-speed",
+            Self::DoorOpen => "door-open",
         }
     }
 }

@@ -253,6 +253,13 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
         self.motion.controlled_stop(fault);
     }
 
+    /// An external fault of a tool at rest: a start that does not come about, or a run that cannot go on. Ignored without a job, and while the tool moves.
+    pub fn fail_at_rest(&mut self, fault: Fault) {
+        if matches!(self.motion.state, State::Ready | State::Finished | State::Held) {
+            self.motion.fail(fault);
+        }
+    }
+
     /// Uncontrolled stop (category 0) with an external fault: ends the run in this period, because the drives are off and the axes no longer
     /// follow the path. The first fault is kept. Ignored where no run is under way.
     pub fn uncontrolled_stop(&mut self, fault: Fault) {

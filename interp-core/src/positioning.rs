@@ -1,4 +1,4 @@
-//! Point-to-point motion of one axis outside a job, from rest to rest within its limits: what homing, jog and probing are made of.
+//! Point-to-point motion of an axis, or of several along a [`Line`], outside a job, from rest to rest within its limits: what homing, jog and probing are made of.
 //!
 //! The periods are counted in integers, and the position is a sum of sums of the jerk: the third difference of the positions is the jerk itself, so a move is
 //! within its limits exactly, apart from the rounding to nanometres. With `n` periods of jerk, `m` of acceleration (both ramps of it included) and `l` of
@@ -12,8 +12,12 @@
 //!
 //! A stop takes the acceleration to 0 at the move's jerk, then brakes by the mirror image of how it has accelerated: exact in integers as well.
 
+mod line;
+
 use crate::math::arith::sqrt;
 use crate::math::number::{Bounded, cube_root, to_f32, to_quanta};
+
+pub use line::{Line, LineLimits};
 
 /// Binary places of a position, below a nanometre.
 const PLACES: u32 = 28;

@@ -4,18 +4,19 @@ use serde::{Deserialize, Serialize};
 
 use crate::safety::InputLines;
 
-/// How far a jog goes.
+/// How far a jog goes, in a straight line of all axes that move.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum JogWay {
     /// 0: by a distance.
     By {
-        /// Distance, nm; negative towards minus.
-        nm: i32,
+        /// Distances of x, y, z, nm; negative towards minus.
+        nm: [i32; 3],
     },
-    /// 1: towards plus, for as long as the request is repeated.
-    Plus,
-    /// 2: towards minus, likewise.
-    Minus,
+    /// 1: for as long as the request is repeated.
+    Towards {
+        /// The direction of x, y, z: below 0 towards minus, 0 none, above 0 towards plus; two or three axes move at 45 degrees.
+        signs: [i8; 3],
+    },
 }
 
 /// What the axes do outside a job.
@@ -83,11 +84,13 @@ pub enum MotionEnd {
     Stuck,
     /// 10: another switch tripped than the one that was looked for.
     WrongSwitch,
+    /// 11: the safety door was opened.
+    Door,
 }
 
 impl MotionEnd {
     /// Every end, in order of its code.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::None,
         Self::Done,
         Self::Stopped,
@@ -99,6 +102,7 @@ impl MotionEnd {
         Self::NotFound,
         Self::Stuck,
         Self::WrongSwitch,
+        Self::Door,
     ];
 
     /// Its name in JSON.
@@ -116,6 +120,7 @@ impl MotionEnd {
             Self::NotFound => "not-found",
             Self::Stuck => "stuck",
             Self::WrongSwitch => "wrong-switch",
+            Self::Door => "door",
         }
     }
 }
@@ -125,8 +130,8 @@ impl MotionEnd {
 pub struct MotionStatus {
     /// What they do.
     pub activity: Activity,
-    /// The axis of the present or last motion, from 0.
-    pub axis: u8,
+    /// The axes of the present or last motion, one bit each.
+    pub axes: u8,
     /// Commanded position, nm; in machine coordinates once homed.
     pub at_nm: [i32; 3],
     /// Axes whose position is known: homed by their switches, or declared, since the position was last lost; one bit each.
@@ -139,7 +144,7 @@ pub struct MotionStatus {
     pub tripped_nm: Option<i32>,
     /// Periods of the present or last motion.
     pub periods: u32,
-    /// [`crate::digest::Digest`] of its positions: one word a period, the moved axis's position.
+    /// [`crate::digest::Digest`] of its positions: three words a period.
     #[serde(with = "postcard::fixint::le")]
     pub digest: u64,
 }

@@ -46,7 +46,7 @@
 //! | 20 | `Repeat` | event `u32`, count `u8` | these events again, then `Ack` |
 //! | 21 | `Profile` | | `Profile` |
 //! | 22 | `SetProfile` | option of the fields of [`Profile`] | `Ack`, and it holds, also after a power cut |
-//! | 23 | `Jog` | axis (a byte, from 0), way ([`JogWay`]), speed (mm/s, `f32`) | as `Configure`; a continuous one stops along its ramp when it is not repeated |
+//! | 23 | `Jog` | way ([`JogWay`]; a direction is three bytes), speed (mm/s, `f32`) | as `Configure`; a continuous one stops along its ramp when it is not repeated |
 //! | 24 | `Home` | axes (a byte, one bit each) | as `Configure` |
 //! | 25 | `Probe` | axis (a byte), distance (nm, `i32`), speed (mm/s, `f32`) | as `Configure` |
 //! | 26 | `Motion` | | `Motion` |
@@ -56,6 +56,8 @@
 //! | 30 | `Pause` | | as `Start` |
 //! | 31 | `StartAt` | pass `u32` | as `Start`; a job with axis limits that is not streamed |
 //! | 32 | `Journal` | | `Journal` |
+//! | 33 | `Turn` | turning (as in `Spindle`), speed (1/min, `u32`) | as `Configure`; off where the host is not heard for a second |
+//! | 34 | `Coolant` | 0 off, 1 on | as `Turn` |
 //!
 //! Header: kind, pattern, spacing, tool side (a byte each), spans along path and side (`u16`), ball radius (mm), feed (mm/s),
 //! scallop height (mm), period (s) (`f32`), window of a streamed job (rows, `u16`; 0 for another one); then 0, or 1 and the axes' limits: velocity (mm/s), acceleration (mm/s^2), jerk (mm/s^3)
@@ -123,10 +125,10 @@ pub use crate::records::{
     SampleRecord, Status, StepSettings, StreamStatus, Words,
 };
 pub use crate::safety::{
-    Configuration, InputLines, LinkTimeoutAction, OVERRIDE_MAX_PERCENT, OVERRIDE_NORMAL_PERCENT, ResetCause,
-    SafetyStatus,
+    Configuration, DoorContact, InputLines, LinkTimeoutAction, OVERRIDE_MAX_PERCENT, OVERRIDE_NORMAL_PERCENT,
+    PauseCause, ResetCause, SafetyStatus,
 };
-pub use crate::spindle::{PWM_STEPS, SpindleOrder, SpindleSettings, Turning};
+pub use crate::spindle::{AtSpeed, PWM_STEPS, SpindleOrder, SpindleSettings, Turning};
 use crate::{
     records::HeaderFields,
     version::{PROTOCOL_VERSION, VersionMismatch},
@@ -235,14 +237,12 @@ pub enum Request {
     Profile,
     /// Keeps a profile beyond a power cut; none: forgets it. In force at once; the job has to be loaded again. Refused while a run is under way.
     SetProfile(Option<Profile>),
-    /// Moves an axis outside a job, within the profile's limits, and within its travel once homed. Another one of the same axis and way keeps a continuous
+    /// Moves axes outside a job along a straight line, within the profile's limits, and within their travel once homed. Another one the same way keeps a continuous
     /// jog going. `Hold`, `Stop` and `Abort` end it along its ramp.
     Jog {
-        /// The axis, from 0.
-        axis: u8,
         /// How far.
         way: JogWay,
-        /// Speed, mm/s; the profile's velocity bounds it.
+        /// Speed along the line, mm/s; the profile's velocities bound it, and the feed override at its begin applies.
         speed_mm_s: f32,
     },
     /// Homes axes by their switches, in the profile's order. Ends along the ramp when the host is not heard any more.
@@ -276,6 +276,18 @@ pub enum Request {
     },
     /// Asks for the run that was under way last, also before a power cut.
     Journal,
+    /// Switches the spindle outside a run; off where the host is not heard for a second, and at the next start, which has the job's own.
+    Turn {
+        /// How it turns.
+        turning: Turning,
+        /// Speed, 1/min.
+        rpm: u32,
+    },
+    /// Switches the coolant, in a run for the rest of it, outside as `Turn`.
+    Coolant {
+        /// Whether to switch it on.
+        on: bool,
+    },
 }
 
 impl From<Command> for Request {

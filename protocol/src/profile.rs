@@ -3,10 +3,16 @@
 use interp_core::{AxisLimits, steps::StepConfig};
 use serde::{Deserialize, Serialize};
 
-use crate::{frame, manual::Homing, records::StepSettings, safety::Configuration, spindle::SpindleSettings};
+use crate::{
+    frame,
+    manual::Homing,
+    records::StepSettings,
+    safety::{Configuration, DoorContact},
+    spindle::SpindleSettings,
+};
 
 /// Longest encoding of a [`Profile`], bytes: every varint at its maximum length.
-pub const PROFILE_BYTES_MAX: usize = 188;
+pub const PROFILE_BYTES_MAX: usize = 190;
 
 /// Greatest axis limit that a profile may have, in mm and seconds: far above any machine, and within `f32` whatever is computed of it.
 const LIMIT_MAX: f32 = 1e9;
@@ -37,6 +43,8 @@ pub struct Profile {
     pub step_inverted: u8,
     /// Axes whose drives are enabled by the level opposite to the one in the board's table, one bit each.
     pub enable_inverted: u8,
+    /// The safety door.
+    pub door: DoorContact,
 }
 
 /// A value of a profile that a job may not exceed. The codes on the wire count from 0 in this order.
@@ -203,6 +211,7 @@ mod tests {
         spindle: None,
         step_inverted: 0,
         enable_inverted: 0,
+        door: DoorContact::NormallyClosed,
     };
 
     fn axes() -> AxisLimits {
@@ -316,6 +325,7 @@ mod tests {
                 max_rpm: u32::MAX,
                 at_speed_ticks: u32::MAX,
                 stops_at_pause: true,
+                at_speed: crate::spindle::AtSpeed::Closes,
             }),
             ..PROFILE
         };

@@ -154,6 +154,10 @@ pub enum Reason {
     RowsGone,
     /// 32: a start at a pass, of a job without axis limits or of a streamed one.
     WholeOnly,
+    /// 33: a probe move while the spindle turns.
+    SpindleTurns,
+    /// 34: a jog at a feed override of 0.
+    NoFeed,
 }
 
 impl Reason {
@@ -194,6 +198,8 @@ impl Reason {
             Self::NoSpindle => 30,
             Self::RowsGone => 31,
             Self::WholeOnly => 32,
+            Self::SpindleTurns => 33,
+            Self::NoFeed => 34,
         }
     }
 
@@ -361,6 +367,8 @@ impl fmt::Display for Reason {
                 formatter,
                 "the first part of the job was overwritten while it ran: load it again"
             ),
+            Self::SpindleTurns => write!(formatter, "the spindle turns"),
+            Self::NoFeed => write!(formatter, "the feed override is 0 %"),
             Self::WholeOnly => write!(
                 formatter,
                 "only a job with axis limits that fits into the board's store can begin at a pass"

@@ -86,7 +86,12 @@ impl FaultReport {
     #[must_use]
     pub fn lines(self) -> InputLines {
         match self.kind() {
-            Some(FaultKind::EmergencyStop | FaultKind::LimitSwitch | FaultKind::DriveFault) => {
+            Some(
+                FaultKind::EmergencyStop
+                | FaultKind::LimitSwitch
+                | FaultKind::DriveFault
+                | FaultKind::DoorOpen,
+            ) => {
                 // Saturates, so that every value yields inputs.
                 #[allow(
                     clippy::cast_possible_truncation,

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::spindle::SpindleOrder;
+
 pub use interp_core::command::{OVERRIDE_MAX_PERCENT, OVERRIDE_NORMAL_PERCENT};
 
 /// The board's safety inputs, one bit each, set where the input is asserted, independent of its electrical level.
@@ -15,6 +17,8 @@ pub use interp_core::command::{OVERRIDE_MAX_PERCENT, OVERRIDE_NORMAL_PERCENT};
 /// | 7, 8, 9 | drive fault x, y, z |
 /// | 10 | drive fault, one input for all drives |
 /// | 11 | probe |
+/// | 12 | safety door, or another request for a hold |
+/// | 13 | the spindle is at speed |
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct InputLines(pub u16);
 
@@ -28,12 +32,16 @@ impl InputLines {
     /// The drive faults of all axes, and the common one.
     pub const DRIVE_FAULTS: Self = Self(0x780);
     /// All inputs.
-    pub const ALL: Self = Self(0xfff);
+    pub const ALL: Self = Self(0x3fff);
     /// The probe, which stops no run.
     pub const PROBE: Self = Self(0x800);
+    /// The safety door is open: a run pauses.
+    pub const DOOR: Self = Self(0x1000);
+    /// The spindle is at speed.
+    pub const AT_SPEED: Self = Self(0x2000);
 
     /// Names of the inputs, by bit.
-    pub const NAMES: [&str; 12] = [
+    pub const NAMES: [&str; 14] = [
         "emergency stop",
         "limit switch x-",
         "limit switch x+",
@@ -46,6 +54,8 @@ impl InputLines {
         "drive fault z",
         "drive fault",
         "probe",
+        "safety door",
+        "spindle at speed",
     ];
 
     /// Intersection.
@@ -169,6 +179,42 @@ impl ResetCause {
     }
 }
 
+/// Why the board has paused a run by itself.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum PauseCause {
+    /// 0: it has not.
+    #[default]
+    None,
+    /// 1: the safety door was opened.
+    Door,
+    /// 2: the spindle fell below its speed.
+    BelowSpeed,
+}
+
+impl PauseCause {
+    /// Its name in JSON.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Door => "door",
+            Self::BelowSpeed => "below-speed",
+        }
+    }
+}
+
+/// What the safety door's contact does.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum DoorContact {
+    /// 0: there is none; the input is not read.
+    #[default]
+    None,
+    /// 1: opens with the door: a broken wire counts as an open door.
+    NormallyClosed,
+    /// 2: closes when the door opens.
+    NormallyOpen,
+}
+
 /// The safety state of the board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SafetyStatus {
@@ -188,6 +234,10 @@ pub struct SafetyStatus {
     pub configuration: Configuration,
     /// Why the board started.
     pub reset: ResetCause,
+    /// Why the board has paused this run, or the last one, by itself; until the next resume or start.
+    pub pause: PauseCause,
+    /// Spindle and coolant as they are switched now.
+    pub spindle: SpindleOrder,
 }
 
 impl SafetyStatus {
@@ -201,6 +251,8 @@ impl SafetyStatus {
         feed_override: OVERRIDE_NORMAL_PERCENT,
         configuration: Configuration::DEFAULT,
         reset: ResetCause::Unknown,
+        pause: PauseCause::None,
+        spindle: SpindleOrder::OFF,
     };
 }
 
@@ -221,9 +273,11 @@ mod tests {
             InputLines::LIMITS,
             InputLines::DRIVE_FAULTS,
             InputLines::PROBE,
+            InputLines::DOOR,
+            InputLines::AT_SPEED,
         ];
         let counts = classes.map(|class| class.names().count());
-        assert_eq!(counts, [1, 6, 4, 1]);
+        assert_eq!(counts, [1, 6, 4, 1, 1, 1]);
         let all = classes.into_iter().fold(InputLines::NONE, InputLines::or);
         assert_eq!(all, InputLines::ALL);
         assert_eq!(all.names().count(), InputLines::NAMES.len());

@@ -37,13 +37,27 @@ impl SpindleOrder {
     };
 }
 
+/// How the board knows that the spindle is at speed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum AtSpeed {
+    /// 0: by time alone.
+    #[default]
+    ByTime,
+    /// 1: the drive's contact closes at speed: a broken wire counts as below it.
+    Closes,
+    /// 2: the contact opens at speed.
+    Opens,
+}
+
 /// The spindle of a machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SpindleSettings {
     /// Speed at the full output, 1/min.
     pub max_rpm: u32,
-    /// Periods from switching on to the first motion.
+    /// Periods from switching on to the first motion; with an input, after which its silence is a fault.
     pub at_speed_ticks: u32,
     /// It is switched off while the tool is lifted for a pause.
     pub stops_at_pause: bool,
+    /// How the board knows that it is at speed.
+    pub at_speed: AtSpeed,
 }

@@ -85,7 +85,7 @@ impl Bench {
 }
 
 /// The digest of the same jog in this process, from the same position.
-fn local_digest(at_nm: [i32; 3], axis: u8, nm: i32) -> String {
+fn local_digest(at_nm: [i32; 3], nm: [i32; 3]) -> String {
     let profile = job_file::parse_profile("machine.toml", PROFILE).unwrap();
     let mut board = Local::<64>::new();
     let mut host = integration_tests::Host::default();
@@ -95,7 +95,6 @@ fn local_digest(at_nm: [i32; 3], axis: u8, nm: i32) -> String {
         Request::Drives { on: true },
         Request::SetHome { home_nm: at_nm },
         Request::Jog {
-            axis,
             way: JogWay::By { nm },
             speed_mm_s: 1000.0,
         },
@@ -121,7 +120,7 @@ fn from_a_bare_board_to_a_placed_job() {
     assert_eq!(jogged["at_mm"], serde_json::json!([11.0, 1.0, -1.0]));
     assert_eq!(
         jogged["digest"],
-        local_digest([1_000_000, 1_000_000, -1_000_000], 0, 10_000_000)
+        local_digest([1_000_000, 1_000_000, -1_000_000], [10_000_000, 0, 0])
     );
     let (is_done, said) = bench.tried(&["jog", "x+60"]);
     assert!(

@@ -7,9 +7,9 @@ use interp_core::{
 };
 use proptest::prelude::*;
 use protocol::message::{
-    CHUNK_WORDS_MAX, Capabilities, Clock, Configuration, Description, FaultReport, InputLines,
-    LinkTimeoutAction, PassDigest, Profile, Reason, Reply, Report, Request, ResetCause, SAMPLES_MAX,
-    SafetyStatus, SampleRecord, Status, StreamStatus, Words,
+    CHUNK_WORDS_MAX, Capabilities, Clock, Configuration, Description, DoorContact, FaultReport, InputLines,
+    LinkTimeoutAction, PassDigest, PauseCause, Profile, Reason, Reply, Report, Request, ResetCause,
+    SAMPLES_MAX, SafetyStatus, SampleRecord, SpindleOrder, Status, StreamStatus, Turning, Words,
 };
 
 use super::{reasons, requests};
@@ -85,10 +85,13 @@ fn any_lines() -> impl Strategy<Value = InputLines> {
 prop_compose! {
     fn any_safety()(lines in any_lines(), latched in any_lines(), flags in any::<[bool; 3]>(), feed_override: u8,
                     configuration in any_configuration(),
-                    reset in prop::sample::select(&[ResetCause::Unknown, ResetCause::Pin, ResetCause::LowPower]))
+                    reset in prop::sample::select(&[ResetCause::Unknown, ResetCause::Pin, ResetCause::LowPower]),
+                    pause in prop::sample::select(&[PauseCause::None, PauseCause::Door, PauseCause::BelowSpeed]), rpm: u32)
         -> SafetyStatus {
         let [homed, drives_on, link_timed_out] = flags;
-        SafetyStatus { lines, latched, homed, drives_on, link_timed_out, feed_override, configuration, reset }
+        let turning = if homed { Turning::Clockwise } else { Turning::Counterclockwise };
+        let spindle = SpindleOrder { turning, rpm, coolant: drives_on };
+        SafetyStatus { lines, latched, homed, drives_on, link_timed_out, feed_override, configuration, reset, pause, spindle }
     }
 }
 
@@ -113,6 +116,7 @@ prop_compose! {
             step_inverted: u8::from(has_travel),
             enable_inverted: 7,
             spindle: None,
+            door: if has_travel { DoorContact::NormallyOpen } else { DoorContact::None },
         }
     }
 }

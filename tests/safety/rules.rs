@@ -199,7 +199,12 @@ impl Bench {
             Order::Configure(_) | Order::Drives { on: false } => !under_way,
             Order::Drives { on: true } => !under_way && stops | rules.latched == 0,
             Order::SetHome { .. } => !under_way && rules.drives,
-            Order::SetUp(_) | Order::Move(_) | Order::Spindle(_) | Order::BeginAt(_) => {
+            Order::SetUp(_)
+            | Order::Move(_)
+            | Order::Spindle(_)
+            | Order::Turn { .. }
+            | Order::Coolant { .. }
+            | Order::BeginAt(_) => {
                 unreachable!("not tried here")
             }
         };
@@ -210,7 +215,7 @@ impl Bench {
                 Order::Configure(_) => {}
                 Order::Drives { on } => (rules.drives, rules.homed) = (on, on && rules.homed),
                 Order::SetHome { .. } => rules.homed = true,
-                Order::SetUp(_) | Order::Move(_) | Order::Spindle(_) | Order::BeginAt(_) => {}
+                _ => {}
             }
         }
         self.follows_the_rules(&self.half.status())

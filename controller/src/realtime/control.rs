@@ -104,6 +104,9 @@ impl Control {
     /// a change of the clock before the end of a `Run` was reported.
     pub(super) fn obey(&mut self, instruction: Instruction) -> bool {
         self.obeyed = true;
+        if matches!(instruction, Instruction::Command(_)) {
+            self.spindle.stop_waiting();
+        }
         match instruction {
             // A queued abort or stop is not replaced by a later command.
             Instruction::Command(_) if self.command == Some(Command::Abort) => {}

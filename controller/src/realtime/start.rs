@@ -1,4 +1,4 @@
-//! Conditions for the start of a run: drives, home, position.
+//! Conditions for the start of a run: drives, home, position, door, spindle.
 //!
 //! **Start position.** A job with axis limits starts at its home. The start is refused where the axes stand elsewhere, because
 //! no path would lead to its first sample. Restarted without a new declaration of the home, it starts where it ended: at its home, or
@@ -6,12 +6,12 @@
 //! **Without a home.** Where none is required and none was declared, the axes count as standing at the job's home.
 //! **After a job without limits** the axes' position is unknown: no links led from pass to pass.
 
-use interp_core::{command::Command, sample::State};
-use protocol::message::{Activity, Clock, InputLines, MotionStatus, Reason};
+use interp_core::command::Command;
+use protocol::message::{Activity, InputLines, MotionStatus, Reason};
 
 use super::{RealTime, run::RunRecord};
 use crate::{
-    manual::{Change, Motion},
+    manual::{Allowed, Change, Motion},
     safety::{Order, may_start},
 };
 
@@ -22,7 +22,10 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
     /// The reason of the refusal; nothing has changed.
     pub fn order(&mut self, order: Order) -> Result<(), Reason> {
         let state = self.interpolator.state();
-        let keeps = matches!(order, Order::Move(_) | Order::Acknowledge);
+        let keeps = matches!(
+            order,
+            Order::Move(_) | Order::Acknowledge | Order::Turn { .. } | Order::Coolant { .. }
+        );
         if self.control.manual.is_active() && !keeps {
             return Err(Reason::Moving);
         }
@@ -32,7 +35,12 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
                 self.set_position(home_nm);
                 self.control.manual.declared();
             }
-            Order::Drives { on: false } if !self.control.safety.status().homed => self.lose_position(),
+            Order::Drives { on: false } => {
+                self.control.spindle.off();
+                if !self.control.safety.status().homed {
+                    self.lose_position();
+                }
+            }
             Order::Move(motion) => self.begin_motion(motion)?,
             Order::SetUp(setup) => {
                 self.control.safety.set_up(setup.as_ref());
@@ -46,6 +54,8 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
                 }
             }
             Order::Spindle(order) => self.control.spindle.order(order)?,
+            Order::Turn { turning, rpm } => self.turn(turning, rpm)?,
+            Order::Coolant { on } => self.switch_coolant(on)?,
             Order::BeginAt(pass) => {
                 let begins_anywhere = self.interpolator.has_limits() && !self.interpolator.is_streamed();
                 if pass > 0 && !begins_anywhere {
@@ -115,51 +125,10 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         Some(Command::Start)
     }
 
-    /// A start or resume: held back until the spindle is at speed. In lockstep time is the host's, and nothing turns.
-    #[cold]
-    #[inline(never)]
-    pub(super) fn with_spindle(&mut self, command: Option<Command>) -> Option<Command> {
-        let state = self.interpolator.state();
-        let may = match command {
-            Some(Command::Start) => Command::Start.is_allowed(state) && self.may_start().is_ok(),
-            _ => state == State::Held,
-        };
-        self.control.host_is_gone = false;
-        self.control.pauses = false;
-        let waits = may && !self.control.spindle.is_ready() && self.control.clock == Clock::Free;
-        if waits {
-            self.control.command = command;
-            return None;
-        }
-        command
-    }
-
-    /// A start waits for the spindle.
-    fn spins_up(&self) -> bool {
-        self.control.command == Some(Command::Start) && self.control.spindle.output() != 0
-    }
-
-    /// The run came to rest, because the host is gone or for a pause: the spindle too, with a pause only above the surface and if the profile says so.
-    #[cold]
-    #[inline(never)]
-    pub(super) fn came_to_rest(&mut self, state: State) {
-        let stops = self.control.host_is_gone
-            || (self.interpolator.is_lifted() && self.control.spindle.stops_at_pause());
-        self.control.host_is_gone = false;
-        self.control.pauses = false;
-        if state == State::Held && stops {
-            self.control.spindle.off();
-        }
-    }
-
     /// Begins motion outside a job, from where the axes stand.
     fn begin_motion(&mut self, motion: Motion) -> Result<(), Reason> {
         if motion == Motion::Stop && self.spins_up() {
-            self.control.command = None;
-            self.control.spindle.off();
-            // The end of a run that has not begun.
-            self.control.safety.ending = true;
-            self.control.safety.recheck();
+            self.give_up_start();
             return Ok(());
         }
         let status = self.control.safety.status();
@@ -170,7 +139,13 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
                 self.control.manual.place(at_nm);
             }
         }
-        self.control.manual.begin(motion, status.lines, status.homed)?;
+        let allowed = Allowed {
+            lines: status.lines,
+            is_homed: status.homed,
+            feed_override: status.feed_override,
+            spindle_turns: self.control.spindle.turns(),
+        };
+        self.control.manual.begin(motion, &allowed)?;
         if matches!(motion, Motion::Home { .. }) {
             // Until every axis is homed.
             self.control.safety.set_homed(None);

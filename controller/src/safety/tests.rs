@@ -162,7 +162,7 @@ fn a_host_that_is_gone_is_noticed_on_time_and_only_in_a_run_on_a_free_clock() {
     let running = [State::Running; 100];
     let mut safety = patient(LinkTimeoutAction::Hold, 20);
     assert_eq!(ticks_until_hold(&mut safety, Clock::Free, &running[..19]), None);
-    safety.heard();
+    safety.heard(false);
     assert!(!safety.status.link_timed_out);
     assert_eq!(ticks_until_hold(&mut safety, Clock::Free, &running), Some(20));
     assert!(safety.status.link_timed_out);

@@ -8,7 +8,7 @@ use protocol::{
 
 /// Maximum length of an answer stored for a retransmission, bytes: a frame of a `Profile` with every varint at its maximum length. That of a
 /// `Status` is shorter.
-const ANSWER_MAX: usize = 199;
+const ANSWER_MAX: usize = 201;
 
 /// The last answered request, with its answer for a retransmission.
 #[derive(Debug)]
@@ -101,6 +101,10 @@ mod tests {
                     link_timeout_ticks: u32::MAX,
                     ..Configuration::DEFAULT
                 },
+                spindle: protocol::message::SpindleOrder {
+                    rpm: u32::MAX,
+                    ..protocol::message::SpindleOrder::OFF
+                },
                 ..SafetyStatus::DEFAULT
             },
         };
@@ -147,7 +151,9 @@ mod tests {
                 max_rpm: u32::MAX,
                 at_speed_ticks: u32::MAX,
                 stops_at_pause: true,
+                at_speed: protocol::message::AtSpeed::Opens,
             }),
+            door: protocol::message::DoorContact::NormallyOpen,
         };
         let longest = Reply::Profile {
             number: u16::MAX,

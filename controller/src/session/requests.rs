@@ -2,7 +2,7 @@
 
 use interp_core::{command::Command, job::Header};
 use protocol::message::{
-    Activity, Clock, Excess, OVERRIDE_MAX_PERCENT, ProfileLimit, Reason, Reply, Request, job_mark,
+    Activity, Clock, Excess, OVERRIDE_MAX_PERCENT, ProfileLimit, Reason, Reply, Request, Status, job_mark,
 };
 
 use super::{
@@ -12,7 +12,7 @@ use super::{
 use crate::{
     machine::{Busy, Instruction, Machine},
     manual::Motion,
-    safety::Order,
+    safety::{Order, may_resume},
     upload::Upload,
 };
 
@@ -60,19 +60,13 @@ impl Session {
             _ if needs_rest(request) && machine.motion().activity != Activity::Rest => Err(Reason::Moving),
             Request::SetProfile(ref profile) => self.set_profile(machine, profile.as_ref()),
             Request::SetOffsets(ref offsets) => self.set_offsets(machine, offsets),
-            Request::Jog {
-                axis,
-                way,
-                speed_mm_s,
-            } => machine.order(Order::Move(Motion::Jog {
-                axis,
-                way,
-                speed_mm_s,
-            })),
+            Request::Jog { way, speed_mm_s } => machine.order(Order::Move(Motion::Jog { way, speed_mm_s })),
             Request::Probe { axis, nm, speed_mm_s } => {
                 machine.order(Order::Move(Motion::Probe { axis, nm, speed_mm_s }))
             }
             Request::Spindle(order) => machine.order(Order::Spindle(order)),
+            Request::Turn { turning, rpm } => machine.order(Order::Turn { turning, rpm }),
+            Request::Coolant { on } => machine.order(Order::Coolant { on }),
             Request::Home { axes } => machine.order(Order::Move(Motion::Home { axes })),
             Request::JobBegin {
                 ref header,
@@ -173,9 +167,12 @@ impl Session {
         if ends && machine.motion().activity != Activity::Rest {
             return machine.order(Order::Move(Motion::Stop));
         }
-        let state = machine.status().state;
+        let Status { state, safety, .. } = machine.status();
         if !command.is_allowed(state) {
             return Err(Reason::WrongState { state });
+        }
+        if command == Command::Resume {
+            may_resume(&safety)?;
         }
         if command == Command::Start {
             if self.is_outdated {

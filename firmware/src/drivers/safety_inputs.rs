@@ -1,4 +1,4 @@
-//! The inputs: emergency stop, limit switches, drive fault, probe, by the board's table.
+//! The inputs: emergency stop, limit switches, drive fault, probe, safety door, the spindle's speed, by the board's table.
 //!
 //! A tick reads the input register of each port with a safety input, and compares; the inputs are decoded only
 //! when a pin has changed. No interrupt is used, because inputs are evaluated only in ticks.
@@ -48,13 +48,15 @@ const fn input_of(role: Role) -> InputLines {
         Role::LimitMax(axis) => 2 + 2 * axis as u8,
         Role::DriveFault => 10,
         Role::Probe => 11,
+        Role::Door => 12,
+        Role::AtSpeed => 13,
         _ => return InputLines::NONE,
     };
     InputLines(1 << number)
 }
 
 const _: () = assert!(
-    input_of(Role::LimitMax(Axis::Z)).0 == 1 << 6 && InputLines::ALL.0 == (1 << 12) - 1,
+    input_of(Role::LimitMax(Axis::Z)).0 == 1 << 6 && InputLines::ALL.0 == (1 << 14) - 1,
     "the inputs' bits are those of the protocol"
 );
 

@@ -10,7 +10,7 @@ use crate::{
     SRAM_FILL,
     code::{Block, Code},
     line::Line,
-    machine::Machine,
+    machine::{self, Machine},
     memory::Memory,
     options::Options,
     part::{
@@ -410,10 +410,17 @@ impl Chip {
 
     fn scripted(&mut self, event: Event) {
         match event {
-            Event::Input { port, pin, high } => {
-                let bit = 1 << pin;
-                let port = &mut self.ports[port];
-                port.outside = port.outside & !bit | if high { bit } else { 0 };
+            Event::Input { role, is_active } => {
+                if let Some(machine) = self.machine.as_mut().filter(|_| Machine::presses(role)) {
+                    machine.hold(role, is_active);
+                } else {
+                    machine::set(&self.board.line(role), is_active, &mut self.ports);
+                }
+            }
+            Event::Stall(is_stalled) => {
+                if let Some(machine) = &mut self.machine {
+                    machine.stall(is_stalled);
+                }
             }
             Event::Hang => self.hangs = true,
             Event::Fault => self.fault = true,
@@ -428,6 +435,15 @@ impl Chip {
         if let Some(line) = &self.line {
             line.read(&mut self.usart.from_host);
             self.usart.begin(at, self.rcc.apb2_cycles());
+        }
+        for line in self.options.typed() {
+            match script::event(&line, self.board) {
+                Ok(event) => {
+                    self.world.event(at, &line);
+                    self.scripted(event);
+                }
+                Err(why) => self.world.note(why),
+            }
         }
         let seconds = self.world.seconds(at);
         self.over |= self.options.is_over() || self.options.ms.is_some_and(|ms| seconds * 1e3 >= ms);

@@ -29,6 +29,12 @@ pub(crate) struct Machine {
     swapped: Option<[Role; 2]>,
     /// Periods for which a contact bounces.
     bounce: u64,
+    /// Periods that the spindle takes to its speed, since when it is on, and whether something holds it below.
+    spin_up: Option<u64>,
+    turns_since: Option<u64>,
+    stalls: bool,
+    /// Switches that a hand presses.
+    held: Vec<Role>,
     /// The switches that the carriages press, and since when, in periods.
     pressed: [Option<u64>; 7],
     periods: u64,
@@ -63,7 +69,7 @@ fn role(name: &str) -> Result<Role, String> {
 
 impl Machine {
     /// `key=value;..`: start, lower, upper (mm, three numbers each), steps (per mm), plate (mm); stuck, never (an input), swap (two inputs), bounce (periods),
-    /// reverse (axes, such as `xz`).
+    /// reverse (axes, such as `xz`), spindle (ms to its speed).
     pub(crate) fn parse(text: &str) -> Result<Self, String> {
         let mut machine = Self {
             steps_per_mm: [400.0; 3],
@@ -75,6 +81,10 @@ impl Machine {
             never: None,
             swapped: None,
             bounce: 0,
+            spin_up: None,
+            turns_since: None,
+            stalls: false,
+            held: Vec::new(),
             pressed: [None; 7],
             periods: 0,
             pulses: 0,
@@ -94,6 +104,9 @@ impl Machine {
                 }
                 "plate" => machine.plate_mm = value.parse().map_err(|_| format!("{value}: not a height"))?,
                 "bounce" => machine.bounce = value.parse().map_err(|_| format!("{value}: not a number"))?,
+                "spindle" => {
+                    machine.spin_up = Some(value.parse().map_err(|_| format!("{value}: not a number"))?);
+                }
                 "stuck" => machine.stuck = Some(role(value)?),
                 "never" => machine.never = Some(role(value)?),
                 "swap" => {
@@ -142,9 +155,40 @@ impl Machine {
         }
     }
 
+    /// Whether an input is one that carriages press.
+    pub(crate) fn presses(role: Role) -> bool {
+        SWITCHES.contains(&role)
+    }
+
+    /// A hand presses a switch, or lets it go.
+    pub(crate) fn hold(&mut self, role: Role, is_pressed: bool) {
+        self.held.retain(|held| *held != role);
+        if is_pressed {
+            self.held.push(role);
+        }
+    }
+
+    /// Something holds the spindle below its speed, or lets it go.
+    pub(crate) fn stall(&mut self, is_stalled: bool) {
+        self.stalls = is_stalled;
+    }
+
+    /// The contact of the spindle's drive closes when it is at speed.
+    fn spin(&mut self, board: &Board, ports: &mut [Port; 9]) {
+        let Some(spin_up) = self.spin_up else { return };
+        let enable = board.line(Role::SpindleEnable);
+        let is_on = enable.is_active(ports[enable.pin.port.index()].odr);
+        self.turns_since = is_on.then(|| self.turns_since.unwrap_or(self.periods));
+        let is_at_speed = self
+            .turns_since
+            .is_some_and(|since| self.periods - since >= spin_up);
+        set(&board.line(Role::AtSpeed), is_at_speed && !self.stalls, ports);
+    }
+
     /// Sets the levels of the inputs, once a period.
     pub(crate) fn press(&mut self, board: &Board, ports: &mut [Port; 9]) {
         self.periods += 1;
+        self.spin(board, ports);
         let at = self.at_mm();
         for (index, role) in SWITCHES.into_iter().enumerate() {
             let axis = (index / 2).min(2);
@@ -164,7 +208,7 @@ impl Machine {
                 _ => role,
             };
             let is_open = match self.pressed[index] {
-                _ if self.stuck == Some(role) => true,
+                _ if self.stuck == Some(role) || self.held.contains(&role) => true,
                 _ if self.never == Some(role) => false,
                 None => false,
                 Some(since) => {
@@ -172,13 +216,17 @@ impl Machine {
                     age >= self.bounce || age % BOUNCE_EVERY != 1
                 }
             };
-            let line = board.line(wired);
-            let port = &mut ports[line.pin.port.index()];
-            let bit = line.pin.bit();
-            let is_high = is_open == (line.active == Level::High);
-            port.outside = port.outside & !bit | if is_high { bit } else { 0 };
+            set(&board.line(wired), is_open, ports);
         }
     }
+}
+
+/// Makes an input active or inactive.
+pub(crate) fn set(line: &Line, is_active: bool, ports: &mut [Port; 9]) {
+    let port = &mut ports[line.pin.port.index()];
+    let bit = line.pin.bit();
+    let is_high = is_active == (line.active == Level::High);
+    port.outside = port.outside & !bit | if is_high { bit } else { 0 };
 }
 
 #[cfg(test)]

@@ -1,15 +1,16 @@
 //! The command line.
 
-use std::io::Read;
+use std::io::BufRead;
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
 
 use clap::Parser;
 
 use crate::machine::Machine;
 
-/// Executes the image that would be flashed to an STM32F405/407, unchanged, on models of the chip. Ends with --ms, or with its standard input.
+/// Executes the image that would be flashed to an STM32F405/407, unchanged, on models of the chip. Ends with --ms, or with its standard input, whose lines are events
+/// that happen at once (as WHAT of --at).
 ///
 /// Inputs of the board's table are closed to ground unless an event opens them.
 #[derive(Clone, Debug, Parser)]
@@ -30,7 +31,7 @@ pub(crate) struct Options {
     #[arg(long, default_value_t = 1)]
     pub(crate) seed: u64,
     /// An event: MS:WHAT after power-on, motion+MS:WHAT after the first step pulse, or pulses+N:WHAT with the N-th pulse of a machine's carriages. WHAT is an input that opens (emergency-stop, drive-fault,
-    /// x-min to z-max), an input that closes (x-min=closed), hang, fault or brown-out.
+    /// x-min to z-max), an input that closes (x-min=closed), door, at-speed, stall (a machine's spindle falls below its speed), hang, fault or brown-out.
     #[arg(long, value_name = "EVENT")]
     pub(crate) at: Vec<String>,
     /// Every change of a port's outputs goes to this file: 16 bytes each, little end first: cycle (8), port, by DMA, levels (2), outputs (2), 0 (2).
@@ -52,7 +53,7 @@ pub(crate) struct Options {
     #[arg(long, value_name = "N")]
     pub(crate) cut_flash_every: Option<u64>,
     /// A machine around the board: `key=value;..` with start, lower, upper (mm, three numbers each: carriages and switches), steps (per mm), plate (mm); stuck, never
-    /// (an input), swap (two inputs), bounce (periods), reverse (axes).
+    /// (an input), swap (two inputs), bounce (periods), reverse (axes), spindle (ms to its speed, which its contact reports).
     #[arg(long, value_name = "SPEC", value_parser = Machine::parse)]
     pub(crate) machine: Option<Machine>,
     /// Says what happens as it does.
@@ -60,22 +61,39 @@ pub(crate) struct Options {
     pub(crate) verbose: bool,
     #[arg(skip)]
     end: End,
+    #[arg(skip)]
+    typed: Typed,
 }
 
 /// Set when standard input has ended.
 #[derive(Clone, Debug, Default)]
 struct End(Arc<AtomicBool>);
 
+/// Lines of standard input that are not looked at yet.
+#[derive(Clone, Debug, Default)]
+struct Typed(Arc<Mutex<Vec<String>>>);
+
 impl Options {
     /// Begins to watch standard input, whose end is this program's.
     pub(crate) fn watch_input(&self) {
-        let end = self.end.0.clone();
+        let (end, typed) = (self.end.0.clone(), self.typed.0.clone());
         std::thread::spawn(move || {
-            let mut rest = [0; 64];
-            let mut input = std::io::stdin();
-            while input.read(&mut rest).is_ok_and(|count| count > 0) {}
+            for line in std::io::stdin().lock().lines().map_while(Result::ok) {
+                if let Ok(mut typed) = typed.lock() {
+                    typed.push(line.trim().to_owned());
+                }
+            }
             end.store(true, Ordering::Relaxed);
         });
+    }
+
+    /// The events typed since the last call.
+    pub(crate) fn typed(&self) -> Vec<String> {
+        self.typed
+            .0
+            .lock()
+            .map(|mut lines| std::mem::take(&mut *lines))
+            .unwrap_or_default()
     }
 
     /// Whether standard input has ended.

@@ -1,12 +1,14 @@
 //! Scripted events: inputs that open and close, a processor that hangs or faults, a brown-out.
 
-use boards::{Axis, Board, Level, Line, Role};
+use boards::{Axis, Board, Line, Role};
 
 /// Kind of event.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Event {
-    /// A pin is driven to this level externally.
-    Input { port: usize, pin: u8, high: bool },
+    /// An input becomes active or inactive.
+    Input { role: Role, is_active: bool },
+    /// A machine's spindle is held below its speed, or let go.
+    Stall(bool),
     /// The processor stops executing.
     Hang,
     /// A hard fault at the program's present position.
@@ -40,6 +42,8 @@ pub(crate) fn input_of(role: Role) -> Option<&'static str> {
         Role::EmergencyStop => "emergency-stop",
         Role::DriveFault => "drive-fault",
         Role::Probe => "probe",
+        Role::Door => "door",
+        Role::AtSpeed => "at-speed",
         Role::LimitMin(Axis::X) => "x-min",
         Role::LimitMin(Axis::Y) => "y-min",
         Role::LimitMin(Axis::Z) => "z-min",
@@ -73,26 +77,33 @@ pub(crate) fn entry(text: &str, board: &Board) -> Result<Entry, String> {
         ),
         _ => When::Start(ms(when)? / 1e3),
     };
-    let name = what.to_owned();
+    Ok(Entry {
+        name: what.to_owned(),
+        when,
+        what: event(what, board)?,
+    })
+}
+
+/// Reads what happens.
+pub(crate) fn event(what: &str, board: &Board) -> Result<Event, String> {
     let (what, closed) = what
         .strip_suffix("=closed")
         .map_or((what, false), |name| (name, true));
-    let what = match what {
+    Ok(match what {
         "hang" => Event::Hang,
+        "stall" => Event::Stall(!closed),
         "fault" => Event::Fault,
         "brown-out" => Event::BrownOut,
         input => {
             let line = inputs(board)
                 .find(|line| input_of(line.role) == Some(input))
                 .ok_or_else(|| {
-                    format!("{input}: neither an input of the board nor hang, fault, brown-out")
+                    format!("{input}: neither an input of the board nor stall, hang, fault, brown-out")
                 })?;
             Event::Input {
-                port: line.pin.port.index(),
-                pin: line.pin.number,
-                high: (line.active == Level::High) != closed,
+                role: line.role,
+                is_active: !closed,
             }
         }
-    };
-    Ok(Entry { name, when, what })
+    })
 }

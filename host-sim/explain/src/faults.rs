@@ -176,5 +176,19 @@ fn words(kind: FaultKind) -> [&'static str; 5] {
             "Position the axes and declare their position in mm: `cargo sim run JOB --port DEV --home X,Y,Z`. For a board without axes: `homing_required = false` in [machine].",
             "`cargo sim run JOB --port DEV` right after power-up.",
         ],
+        FaultKind::SpindleSpeed => [
+            "The spindle's contact did not report its speed within `at_speed_ms`. The spindle is off; the tool has not moved, or is held where the pause left it, and the run is over.",
+            "The speed ordered, turns a minute.",
+            "The drive needs longer, reports a fault of its own, or the contact's wire is broken.",
+            "Look at the drive. Measure the time to the highest speed, and set `at_speed_ms` in [spindle] of the profile above it. `cargo sim operate --port DEV abort` acknowledges; then run again, or `run --resume`.",
+            "A spindle whose drive was not switched on.",
+        ],
+        FaultKind::DoorOpen => [
+            "The safety door is open, so no run starts or resumes and the spindle stays off.",
+            "4096, the input's bit.",
+            "The door is open, or the wire of its contact is broken; or the profile names the wrong contact in [door].",
+            "Close the door: `cargo sim operate --port DEV status` no longer names it. Then `resume`, or start again.",
+            "`resume` while the door, whose opening paused the run, is still open.",
+        ],
     }
 }

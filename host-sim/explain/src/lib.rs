@@ -204,6 +204,14 @@ pub fn fault(fault: Fault) -> (String, &'static str) {
             },
             "home the machine; this is a defect of the firmware, or a debugger halted the chip",
         ),
+        FaultKind::SpindleSpeed => (
+            format!("the spindle did not report that it turns at {value} turns a minute"),
+            "look at the spindle's drive and at the wire of its contact; give it more time (`at_speed_ms` in the profile's [spindle]); then abort to acknowledge",
+        ),
+        FaultKind::DoorOpen => (
+            "the safety door is open".to_owned(),
+            "close it; `operate status` then no longer names it",
+        ),
     }
 }
 
@@ -292,6 +300,8 @@ mod tests {
             Reason::NoSpindle,
             Reason::RowsGone,
             Reason::WholeOnly,
+            Reason::SpindleTurns,
+            Reason::NoFeed,
         ]
     }
 

@@ -3,7 +3,7 @@
 use super::{Entry, Family};
 
 /// In the order of codes.
-pub(super) const ENTRIES: [Entry; 33] = [
+pub(super) const ENTRIES: [Entry; 35] = [
     reason(
         0,
         "bad-frame",
@@ -300,6 +300,24 @@ pub(super) const ENTRIES: [Entry; 33] = [
         "It has no axis limits, so no way leads to the pass; or it is larger than the board's store and sent while it runs.",
         "Give the machine a profile with limits; divide a larger job into several.",
         "`run --resume` of a job of 100 x 100 patches.",
+    ),
+    reason(
+        33,
+        "spindle-turns",
+        "A probe move while the spindle turns.",
+        "None.",
+        "A turning tool would cut into plate, setter or part, and bend the probe.",
+        "`cargo sim operate --port DEV spindle off`, and probe when it stands.",
+        "`operate touch z-20 --work 1` right after `operate spindle 8000`.",
+    ),
+    reason(
+        34,
+        "no-feed",
+        "A jog at a feed override of 0 %.",
+        "None.",
+        "The override that was set last holds for jogs too.",
+        "`cargo sim operate --port DEV override 100`.",
+        "`operate jog x+10` after `operate override 0`.",
     ),
 ];
 

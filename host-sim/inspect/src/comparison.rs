@@ -211,7 +211,7 @@ fn stopped_by_input(status: &Status) -> Option<String> {
     let kind = fault.kind()?;
     if !matches!(
         kind,
-        FaultKind::EmergencyStop | FaultKind::LimitSwitch | FaultKind::DriveFault
+        FaultKind::EmergencyStop | FaultKind::LimitSwitch | FaultKind::DriveFault | FaultKind::SpindleSpeed
     ) {
         return None;
     }

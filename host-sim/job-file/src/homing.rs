@@ -1,6 +1,6 @@
-//! The sections `[home]` and `[probe]` of a machine's profile.
+//! The sections `[home]`, `[probe]` and `[door]` of a machine's profile.
 
-use job::{AXES, AxisLimits, Homing, JobError};
+use job::{AXES, AxisLimits, Contact, Homing, JobError};
 use toml::de::DeValue;
 
 use crate::section::Section;
@@ -157,5 +157,23 @@ fn switches(home: &Section<'_>, key: &str, default: [bool; 3]) -> Result<[bool; 
 /// Reads `[probe]`: whether its contact closes when it touches.
 pub(super) fn read_probe(probe: &Section<'_>) -> Result<bool, JobError> {
     probe.only(&["contact"], &[])?;
-    probe.choice("contact", &[("normally-closed", false), ("normally-open", true)])
+    Ok(contact(probe, "contact")? == Contact::NormallyOpen)
+}
+
+/// Reads `[door]`: what its contact does when the door opens.
+pub(super) fn read_door(door: &Section<'_>) -> Result<Contact, JobError> {
+    door.only(&["contact"], &[])?;
+    if !door.has("contact") {
+        return Ok(Contact::NormallyClosed);
+    }
+    contact(door, "contact")
+}
+
+/// What a contact does when what it reports happens.
+pub(super) fn contact(section: &Section<'_>, key: &str) -> Result<Contact, JobError> {
+    let kinds = [
+        ("normally-closed", Contact::NormallyClosed),
+        ("normally-open", Contact::NormallyOpen),
+    ];
+    section.choice(key, &kinds)
 }

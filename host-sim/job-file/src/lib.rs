@@ -88,7 +88,7 @@ pub fn load_profile(path: &Path) -> Result<MachineProfile, JobError> {
 /// As [`load_profile`].
 pub fn parse_profile(name: &str, text: &str) -> Result<MachineProfile, JobError> {
     let document = Reader::new(name, text).document()?;
-    document.only(&["machine", "home", "probe", "spindle"], &[])?;
+    document.only(&["machine", "home", "probe", "door", "spindle"], &[])?;
     machine::read_profile(&document)
 }
 

@@ -29,7 +29,7 @@ const OF_PROFILES: [&str; 2] = ["step_inverted", "enable_inverted"];
 /// Keys of a job alone.
 const OF_JOBS: [&str; 5] = ["period_us", "home_mm", "safe_z_mm", "clearance_mm", "plunge_mm"];
 
-/// A machine's profile: the sections `[machine]`, `[home]`, `[probe]` and `[spindle]` of its file.
+/// A machine's profile: the sections `[machine]`, `[home]`, `[probe]`, `[door]` and `[spindle]` of its file.
 pub(super) fn read_profile(document: &Section<'_>) -> Result<MachineProfile, JobError> {
     let machine = &document.section("machine")?;
     let of_jobs = OF_JOBS.map(|key| (key, "it is a job's"));
@@ -45,6 +45,7 @@ pub(super) fn read_profile(document: &Section<'_>) -> Result<MachineProfile, Job
         .transpose()?;
     let probe = document.optional_section("probe")?;
     let spindle = document.optional_section("spindle")?;
+    let door = document.optional_section("door")?;
     Ok(MachineProfile {
         limits,
         travel_mm,
@@ -53,6 +54,7 @@ pub(super) fn read_profile(document: &Section<'_>) -> Result<MachineProfile, Job
         homing,
         spindle: spindle.map(|spindle| spindle::read_drive(&spindle)).transpose()?,
         probe_closes: probe.map_or(Ok(false), |probe| homing::read_probe(&probe))?,
+        door: door.map(|door| homing::read_door(&door)).transpose()?,
         homing_required: read.homing_required,
         heartbeat_action: read.heartbeat_action,
         heartbeat_timeout_ms: read.heartbeat_timeout_ms,

@@ -2,6 +2,7 @@
 
 use job::{JobError, MachineProfile, Spindle, SpindleDrive};
 
+use crate::homing::contact;
 use crate::section::Section;
 
 /// Fastest spindle, 1/min, and longest time to its speed, ms.
@@ -9,6 +10,9 @@ const RPM_MAX: f64 = 1e6;
 const AT_SPEED_MAX_MS: f64 = 60_000.0;
 /// Default of the time to the speed, ms.
 const AT_SPEED_MS: f64 = 3000.0;
+
+/// Key of the contact that reports the speed.
+const AT_SPEED: &str = "at_speed_contact";
 
 fn rpm(section: &Section<'_>, key: &str) -> Result<u32, JobError> {
     let value = section.number_within(key, 0.0, RPM_MAX, "a speed in turns a minute, e.g. 12000")?;
@@ -48,7 +52,7 @@ pub(super) fn read(section: &Section<'_>, profile: Option<&MachineProfile>) -> R
 
 /// Reads that of a profile.
 pub(super) fn read_drive(section: &Section<'_>) -> Result<SpindleDrive, JobError> {
-    section.only(&["max_rpm", "at_speed_ms", "stops_at_pause"], &[])?;
+    section.only(&["max_rpm", "at_speed_ms", "stops_at_pause", AT_SPEED], &[])?;
     let at_speed_ms = if section.has("at_speed_ms") {
         let value = section.number("at_speed_ms")?;
         if !(0.0..=AT_SPEED_MAX_MS).contains(&value) {
@@ -67,5 +71,9 @@ pub(super) fn read_drive(section: &Section<'_>) -> Result<SpindleDrive, JobError
         max_rpm: rpm(section, "max_rpm")?.max(1),
         at_speed_ms,
         stops_at_pause: !section.has("stops_at_pause") || section.switch("stops_at_pause")?,
+        at_speed: section
+            .has(AT_SPEED)
+            .then(|| contact(section, AT_SPEED))
+            .transpose()?,
     })
 }

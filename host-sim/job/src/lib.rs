@@ -13,9 +13,9 @@ mod text;
 
 pub use error::JobError;
 pub use machine::{
-    AXES, AxisLimits, CLEARANCE_DEFAULT_MM, HEARTBEAT_TIMEOUT_DEFAULT_MS, HEARTBEAT_TIMEOUT_RANGE_MS,
-    HeartbeatAction, Homing, MachineProfile, MachineSpec, PERIOD_DEFAULT_US, PERIOD_RANGE_US, Ratio, Spindle,
-    SpindleDrive, StepOutput,
+    AXES, AxisLimits, CLEARANCE_DEFAULT_MM, Contact, HEARTBEAT_TIMEOUT_DEFAULT_MS,
+    HEARTBEAT_TIMEOUT_RANGE_MS, HeartbeatAction, Homing, MachineProfile, MachineSpec, PERIOD_DEFAULT_US,
+    PERIOD_RANGE_US, Ratio, Spindle, SpindleDrive, StepOutput,
 };
 pub use origin::{
     AlongChoice, CadSource, DirectionTrial, FaceReach, Origin, PartSource, SpacingTrial, StartChoice,

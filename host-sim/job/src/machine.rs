@@ -121,15 +121,26 @@ pub struct Spindle {
     pub coolant: bool,
 }
 
+/// A contact of the machine.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Contact {
+    /// It opens when what it reports happens.
+    NormallyClosed,
+    /// It closes then.
+    NormallyOpen,
+}
+
 /// The spindle of a machine.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpindleDrive {
     /// Speed at the full output, 1/min.
     pub max_rpm: u32,
-    /// Time from switching on to the first motion, ms.
+    /// Time from switching on to the first motion, ms; with a contact that reports the speed, after which its silence is a fault.
     pub at_speed_ms: f64,
     /// It is switched off while the tool is lifted for a pause.
     pub stops_at_pause: bool,
+    /// The contact that reports that it is at speed.
+    pub at_speed: Option<Contact>,
 }
 
 /// A machine as its board keeps it: the greatest limits, the drives, the supervision. A job may lower the limits, but not exceed them.
@@ -157,6 +168,8 @@ pub struct MachineProfile {
     pub probe_closes: bool,
     /// The spindle.
     pub spindle: Option<SpindleDrive>,
+    /// The contact of the safety door: it reports that the door is open.
+    pub door: Option<Contact>,
 }
 
 impl MachineProfile {

@@ -4,9 +4,12 @@ use std::fmt::Write as _;
 
 use interp_core::StepConfig;
 use job::{
-    AXES, AxisLimits, HeartbeatAction, MachineProfile, PERIOD_DEFAULT_US, Ratio, SpindleDrive, StepOutput,
+    AXES, AxisLimits, Contact, HeartbeatAction, MachineProfile, PERIOD_DEFAULT_US, Ratio, SpindleDrive,
+    StepOutput,
 };
-use protocol::message::{LinkTimeoutAction, Profile, SpindleOrder, SpindleSettings, Turning};
+use protocol::message::{
+    AtSpeed, DoorContact, LinkTimeoutAction, Profile, SpindleOrder, SpindleSettings, Turning,
+};
 
 use crate::prepare;
 
@@ -35,9 +38,19 @@ pub fn for_board(profile: &MachineProfile) -> Profile {
             max_rpm: spindle.max_rpm,
             at_speed_ticks: ticks(spindle.at_speed_ms),
             stops_at_pause: spindle.stops_at_pause,
+            at_speed: match spindle.at_speed {
+                None => AtSpeed::ByTime,
+                Some(Contact::NormallyOpen) => AtSpeed::Closes,
+                Some(Contact::NormallyClosed) => AtSpeed::Opens,
+            },
         }),
         step_inverted: bits(profile.step_inverted),
         enable_inverted: bits(profile.enable_inverted),
+        door: match profile.door {
+            None => DoorContact::None,
+            Some(Contact::NormallyClosed) => DoorContact::NormallyClosed,
+            Some(Contact::NormallyOpen) => DoorContact::NormallyOpen,
+        },
     }
 }
 
@@ -61,6 +74,7 @@ pub fn of_board(profile: &Profile) -> MachineProfile {
         spindle,
         step_inverted,
         enable_inverted,
+        door,
     } = *profile;
     let axes = |bits: u8| [0, 1, 2].map(|axis| bits >> axis & 1 != 0);
     let slot_us = PERIOD_DEFAULT_US / f64::from(interp_core::steps::SLOTS);
@@ -95,7 +109,17 @@ pub fn of_board(profile: &Profile) -> MachineProfile {
             max_rpm: spindle.max_rpm,
             at_speed_ms: f64::from(spindle.at_speed_ticks) * PERIOD_DEFAULT_US / US_PER_MS,
             stops_at_pause: spindle.stops_at_pause,
+            at_speed: match spindle.at_speed {
+                AtSpeed::ByTime => None,
+                AtSpeed::Closes => Some(Contact::NormallyOpen),
+                AtSpeed::Opens => Some(Contact::NormallyClosed),
+            },
         }),
+        door: match door {
+            DoorContact::None => None,
+            DoorContact::NormallyClosed => Some(Contact::NormallyClosed),
+            DoorContact::NormallyOpen => Some(Contact::NormallyOpen),
+        },
     }
 }
 
@@ -160,6 +184,14 @@ fn homing_of_board(homing: &protocol::message::Homing) -> job::Homing {
     }
 }
 
+/// A contact in a profile's file.
+const fn name_of(contact: Contact) -> &'static str {
+    match contact {
+        Contact::NormallyClosed => "normally-closed",
+        Contact::NormallyOpen => "normally-open",
+    }
+}
+
 /// The text of the profile's file.
 #[must_use]
 pub fn text(profile: &MachineProfile) -> String {
@@ -175,6 +207,7 @@ pub fn text(profile: &MachineProfile) -> String {
         homing,
         probe_closes,
         spindle,
+        door,
     } = profile;
     let ratio = |ratio: Ratio| match ratio.denominator {
         1 => ratio.numerator.to_string(),
@@ -236,10 +269,16 @@ pub fn text(profile: &MachineProfile) -> String {
     if *probe_closes {
         line(format_args!("\n[probe]\ncontact = \"normally-open\""));
     }
+    if let Some(contact) = door {
+        line(format_args!("\n[door]\ncontact = \"{}\"", name_of(*contact)));
+    }
     if let Some(spindle) = spindle {
         line(format_args!("\n[spindle]\nmax_rpm = {}", spindle.max_rpm));
         line(format_args!("at_speed_ms = {:?}", spindle.at_speed_ms));
         line(format_args!("stops_at_pause = {}", spindle.stops_at_pause));
+        if let Some(contact) = spindle.at_speed {
+            line(format_args!("at_speed_contact = \"{}\"", name_of(contact)));
+        }
     }
     text
 }
@@ -273,10 +312,14 @@ back_off_mm = [3, 3, 3]
 [probe]
 contact = "normally-open"
 
+[door]
+contact = "normally-closed"
+
 [spindle]
 max_rpm = 24000
 at_speed_ms = 2500
 stops_at_pause = false
+at_speed_contact = "normally-open"
 "#;
 
     /// What is kept by a board is what its text says, and the text again.

@@ -102,7 +102,7 @@ pub(super) fn to_run(session: &mut Session, port: &str, as_json: bool) -> Result
 pub(super) fn unreachable_run(error: RemoteError, port: &str, machine: Option<&MachineSpec>) -> Failure {
     let reach = format!("cargo sim operate --port {port} attach");
     let what = match &error {
-        RemoteError::Held | RemoteError::NoFeed => {
+        RemoteError::Held | RemoteError::Paused(_) | RemoteError::NoFeed => {
             return Failure::Failed(Some(format!(
                 "{error}\n  help: {reach}, and type resume, override 100 or stop"
             )));

@@ -1,14 +1,13 @@
 //! Motion outside a job: home, jog, probe, touch-off, work offsets, tool length.
 
+pub(super) mod jog;
+
 use clap::Subcommand;
-use console::{Key, Term};
-use protocol::message::{
-    InputLines, JogWay, MotionEnd, MotionStatus, Offsets, Profile, Request, WORK_OFFSETS,
-};
+use protocol::message::{JogWay, MotionStatus, Offsets, Request, WORK_OFFSETS};
 use serde_json::json;
 
 use super::home::{self, PositionNm};
-use super::out::{say, to_stderr};
+use super::out::say;
 use super::{Failure, Result, run};
 use job::AXES;
 use machine::remote::Session;
@@ -33,10 +32,13 @@ pub(super) struct Distance {
 }
 
 impl Distance {
-    pub(super) fn jog(self, speed_mm_s: f32) -> Request {
+    fn jog(self, speed_mm_s: f32) -> Request {
+        let mut nm = [0; 3];
+        if let Some(place) = nm.get_mut(usize::from(self.axis)) {
+            *place = self.nm;
+        }
         Request::Jog {
-            axis: self.axis,
-            way: JogWay::By { nm: self.nm },
+            way: JogWay::By { nm },
             speed_mm_s,
         }
     }
@@ -181,7 +183,7 @@ fn carried_out(session: &mut Session, request: &Request) -> Result<MotionStatus>
         None => Ok(motion),
         Some((what, remedy)) => Err(Failure::Failed(Some(format!(
             "{what}, with {} in motion, at {} mm\n  help: {remedy}",
-            AXES.get(usize::from(motion.axis)).copied().unwrap_or("?"),
+            letters(motion.axes),
             PositionNm(motion.at_nm).words()
         )))),
     }
@@ -396,7 +398,7 @@ fn touched(session: &mut Session, by: Distance, speed: f32) -> Result<i32> {
         .ok_or_else(|| Failure::Failed(Some("the board did not latch the position".to_owned())))
 }
 
-/// Moves along one axis after the other.
+/// Moves to a position: z first where it goes up, last where it goes down; x and y in a straight line.
 fn go_to(session: &mut Session, to: PositionNm, work: Option<u8>, speed: f32) -> Result<()> {
     must_be_homed(session)?;
     let mut to_nm = to.0;
@@ -410,107 +412,20 @@ fn go_to(session: &mut Session, to: PositionNm, work: Option<u8>, speed: f32) ->
         }
     }
     let stands = session.motion()?.at_nm;
-    let order = if to_nm[2] > stands[2] {
-        [2, 0, 1]
-    } else {
-        [0, 1, 2]
-    };
-    for axis in order {
-        let nm = to_nm[usize::from(axis)].wrapping_sub(stands[usize::from(axis)]);
-        if nm != 0 {
-            carried_out(session, &Distance { axis, nm }.jog(speed))?;
-        }
+    let [x, y, z]: [i32; 3] = std::array::from_fn(|axis| to_nm[axis].wrapping_sub(stands[axis]));
+    let level = [[0, 0, z], [x, y, 0]];
+    let ways = if z > 0 { level } else { [level[1], level[0]] };
+    for nm in ways.into_iter().filter(|nm| *nm != [0; 3]) {
+        let way = JogWay::By { nm };
+        carried_out(
+            session,
+            &Request::Jog {
+                way,
+                speed_mm_s: speed,
+            },
+        )?;
     }
     Ok(())
-}
-
-/// Speeds of the jog by keys, as shares of the profile's velocity.
-const SHARES: [f32; 4] = [0.02, 0.1, 0.3, 1.0];
-
-/// The jog of a key.
-const fn jog_of(key: &Key) -> Option<(u8, JogWay)> {
-    Some(match key {
-        Key::ArrowRight => (0, JogWay::Plus),
-        Key::ArrowLeft => (0, JogWay::Minus),
-        Key::ArrowUp => (1, JogWay::Plus),
-        Key::ArrowDown => (1, JogWay::Minus),
-        Key::PageUp => (2, JogWay::Plus),
-        Key::PageDown => (2, JogWay::Minus),
-        _ => return None,
-    })
-}
-
-/// Jogs for as long as keys are held: the board stops the axis when the key's repetition ends.
-pub(super) fn by_keys(session: &mut Session) -> Result<()> {
-    let term = Term::stderr();
-    if !term.is_term() || !console::user_attended() {
-        return Err(Failure::input(
-            "a jog by keys needs a terminal",
-            "give the distance: operate jog x+10",
-        ));
-    }
-    let Some(Profile { velocity_mm_s, .. }) = session.profile()? else {
-        return Err(Failure::Failed(Some(
-            "the board keeps no machine profile\n  help: cargo sim settings --port DEV --machine machine.toml".to_owned(),
-        )));
-    };
-    to_stderr(format_args!(
-        "hold a key: arrows x and y, page up and down z; + and - speed; q or Escape ends. An axis stops when its key is released."
-    ));
-    let (sender, keys) = std::sync::mpsc::channel();
-    // The thread ends with the process, or with the last key.
-    std::thread::spawn(move || {
-        while let Ok(key) = Term::stderr().read_key() {
-            if sender.send(key).is_err() {
-                break;
-            }
-        }
-    });
-    let mut share = 1;
-    let mut lit = InputLines::NONE;
-    loop {
-        let first = keys.recv_timeout(std::time::Duration::from_millis(500));
-        // Keys that have waited while the board answered are one wish: the last.
-        let key = std::iter::once(first).chain(keys.try_iter().map(Ok)).last();
-        match key {
-            Some(Ok(Key::Escape | Key::Char('q' | 'Q') | Key::CtrlC)) => {
-                session.command(&Request::Hold).ok();
-                return Ok(());
-            }
-            Some(Ok(Key::Char('+'))) => share = (share + 1).min(SHARES.len() - 1),
-            Some(Ok(Key::Char('-'))) => share = share.saturating_sub(1),
-            Some(Ok(key)) => {
-                if let Some((axis, way)) = jog_of(&key) {
-                    let speed_mm_s = velocity_mm_s[usize::from(axis)] * SHARES[share];
-                    let request = Request::Jog {
-                        axis,
-                        way,
-                        speed_mm_s,
-                    };
-                    if let Err(error) = session.command(&request) {
-                        to_stderr(format_args!("{error}"));
-                    }
-                }
-            }
-            Some(Err(std::sync::mpsc::RecvTimeoutError::Disconnected)) => return Ok(()),
-            Some(Err(std::sync::mpsc::RecvTimeoutError::Timeout)) | None => {}
-        }
-        let motion = session.motion()?;
-        if motion.end == MotionEnd::LimitSwitch
-            && motion.lines != lit
-            && let Some((what, remedy)) = axes::failure(&motion)
-        {
-            to_stderr(format_args!("{what}; {remedy}"));
-        }
-        lit = motion.lines;
-        let [x, y, z] = motion.at_nm.map(|nm| f64::from(nm) / NM_PER_MM);
-        let percent = SHARES[share] * 100.0;
-        term.clear_line().ok();
-        term.write_str(&format!(
-            "x {x:9.3}  y {y:9.3}  z {z:9.3} mm   speed {percent:.0} %\r"
-        ))
-        .ok();
-    }
 }
 
 #[cfg(test)]

@@ -32,6 +32,7 @@ mod run;
 mod scripted;
 mod settings;
 mod simulate;
+mod spindle;
 mod swept_words;
 mod typed;
 mod verify;

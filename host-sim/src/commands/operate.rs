@@ -6,14 +6,15 @@ use protocol::message::{OVERRIDE_MAX_PERCENT, Request, Status};
 use serde_json::json;
 
 use super::out::{say, to_stderr};
-use super::{Failure, Result, attach, axes, home, run};
+use super::{Failure, Result, attach, axes, home, run, spindle};
 use machine::remote::operate::{act, sentences};
 
 /// Switches a board's drives, homes and jogs its axes, touches off, holds, resumes or stops its run, follows it, and prints its state.
 ///
 /// Example: cargo sim operate --port /dev/ttyUSB0 status
 /// Example: cargo sim operate --port /dev/ttyUSB0 home
-/// Example: cargo sim operate --port /dev/ttyUSB0 jog x+10
+/// Example: cargo sim operate --port /dev/ttyUSB0 jog x+10 y-5
+/// Example: cargo sim operate --port /dev/ttyUSB0 spindle 12000
 /// Example: cargo sim operate --port /dev/ttyUSB0 touch z-30 --work 1 --plate 15 --radius 3
 /// Example: cargo sim operate --port /dev/ttyUSB0 attach
 #[derive(Debug, Args)]
@@ -72,14 +73,22 @@ enum OperatorCommand {
         #[arg(long, value_parser = axes::axes, conflicts_with = "position_mm")]
         axes: Option<u8>,
     },
-    /// Jogs an axis by a distance, such as x+10 or z-0.5 (mm).
+    /// Jogs axes by distances in a straight line, such as x+10, or x+10 y-5 (mm).
     Jog {
-        /// Axis and distance, mm. Without: by keys, for as long as they are held.
-        #[arg(value_parser = axes::distance, allow_hyphen_values = true)]
-        by: Option<axes::Distance>,
-        /// Speed, mm/s; the profile's velocity bounds it.
+        /// Axes and distances, mm. Without: by keys, for as long as they are held.
+        #[arg(value_parser = axes::distance, num_args = 0..=3)]
+        by: Vec<axes::Distance>,
+        /// Speed along the line, mm/s; the profile's velocities bound it.
         #[arg(long, default_value_t = axes::JOG_MM_S)]
         speed: f32,
+    },
+    /// Turns the spindle outside a run, for as long as this command runs: spindle 12000, spindle off.
+    Spindle(spindle::Turn),
+    /// Switches the coolant: in a run for the rest of it, outside for as long as this command runs.
+    Coolant {
+        /// on or off.
+        #[arg(value_parser = spindle::switch, action = clap::ArgAction::Set)]
+        on: bool,
     },
     /// Moves an axis until the probe trips, at most by a distance, such as z-30 (mm).
     Probe {
@@ -95,9 +104,20 @@ enum OperatorCommand {
 }
 
 impl OperatorCommand {
+    /// For how long the spindle is to turn.
+    const fn seconds(&self) -> Option<f64> {
+        match self {
+            Self::Spindle(turn) => turn.seconds,
+            _ => None,
+        }
+    }
+
     /// The request on the line; none for a jog by keys.
-    fn request(&self) -> Option<Request> {
-        Some(match self {
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    fn request(&self) -> std::result::Result<Option<Request>, String> {
+        Ok(Some(match self {
             Self::Status => Request::Status,
             Self::Hold => Command::Hold.into(),
             Self::Resume => Command::Resume.into(),
@@ -114,10 +134,13 @@ impl OperatorCommand {
             Self::Home { axes, .. } => Request::Home {
                 axes: axes.unwrap_or(0),
             },
-            Self::Jog { by, speed } => by.as_ref()?.jog(*speed),
+            Self::Jog { by, .. } if by.is_empty() => return Ok(None),
+            Self::Jog { by, speed } => axes::jog::by(by, *speed)?,
+            Self::Spindle(turn) => turn.request(),
+            Self::Coolant { on } => Request::Coolant { on: *on },
             Self::Probe { by, speed } => by.probe(*speed),
             Self::Acknowledge => Request::Acknowledge,
-        })
+        }))
     }
 }
 
@@ -138,7 +161,7 @@ pub(super) fn typed(line: &str) -> std::result::Result<Option<Request>, String> 
         return Ok(None);
     }
     match Line::try_parse_from(words) {
-        Ok(line) => match line.command.request() {
+        Ok(line) => match line.command.request().map_err(|why| format!("error: {why}"))? {
             Some(request) => Ok(Some(request)),
             None => Err("error: a jog needs its distance here, such as jog x+10".to_owned()),
         },
@@ -167,13 +190,19 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         Action::Command(command) => command,
     };
     let mut session = run::open_port(port)?;
-    let Some(request) = command.request() else {
-        return axes::by_keys(&mut session);
+    let request = command
+        .request()
+        .map_err(|why| Failure::input(why, "cargo sim operate jog --help"))?;
+    let Some(request) = request else {
+        return axes::jog::by_keys(&mut session);
     };
     if axes::moves(&request) {
         return axes::go(&mut session, &request, arguments.json);
     }
     let status = act(&mut session, &request).map_err(Failure::from)?;
+    if spindle::needs_a_host(&request, &status) {
+        return spindle::keep(&mut session, command.seconds(), arguments.json);
+    }
     let board = session.capabilities().description.board.clone();
     let stays = matches!(command, OperatorCommand::Resume) && attach::needs_a_host(&status);
     let motion = session.motion()?;
@@ -227,6 +256,8 @@ pub(super) fn json_of(status: &Status, board: &str) -> serde_json::Value {
         "host_gone": safety.link_timed_out,
         "feed_override_pct": safety.feed_override,
         "last_reset": safety.reset.name(),
+        "spindle": spindle::json_of(safety.spindle),
+        "pause": safety.pause.name(),
         "deadline_misses": status.deadline_misses,
     })
 }
@@ -248,11 +279,18 @@ mod tests {
         };
         assert_eq!(typed("home 0,0,-1.5"), Ok(Some(declared)));
         let jog = Request::Jog {
-            axis: 2,
-            way: protocol::message::JogWay::By { nm: -500_000 },
+            way: protocol::message::JogWay::By {
+                nm: [10_000_000, 0, -500_000],
+            },
             speed_mm_s: 3.0,
         };
-        assert_eq!(typed("jog z-0.5 --speed 3"), Ok(Some(jog)));
+        assert_eq!(typed("jog z-0.5 x+10 --speed 3"), Ok(Some(jog)));
+        let turn = Request::Turn {
+            turning: protocol::message::Turning::Counterclockwise,
+            rpm: 12_000,
+        };
+        assert_eq!(typed("spindle 12000 --ccw"), Ok(Some(turn)));
+        assert_eq!(typed("coolant on"), Ok(Some(Request::Coolant { on: true })));
         assert_eq!(typed(" "), Ok(None));
         for wrong in [
             "overide 50",
@@ -262,6 +300,10 @@ mod tests {
             "jog",
             "jog w+1",
             "jog x+1e9",
+            "jog x+1 x+2",
+            "spindle fast",
+            "spindle -1",
+            "coolant 1",
         ] {
             assert!(
                 typed(wrong).is_err_and(|why| why.starts_with("error: ")),

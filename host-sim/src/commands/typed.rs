@@ -12,7 +12,7 @@ use machine::remote::RemoteError;
 use machine::remote::operate::Operator;
 
 /// The commands, for the prompt.
-pub(super) const WORDS: &str = "hold, pause, resume, stop, abort, override 50, status";
+pub(super) const WORDS: &str = "hold, pause, resume, stop, abort, override 50, coolant off, status";
 
 /// The operator at the terminal: reads lines from standard input, prints the answers above the progress bar.
 pub(super) struct Console {
@@ -84,6 +84,10 @@ impl Operator for Console {
                 "the feed override is {percent} %, so the run is not compared"
             )),
         }
+    }
+
+    fn paused(&mut self, cause: &'static str) {
+        self.say(&format!("paused: {cause}"));
     }
 
     fn told(&mut self, _: &Request, came: Result<Status, RemoteError>) {

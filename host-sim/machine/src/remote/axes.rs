@@ -19,13 +19,29 @@ pub fn go(
     mut each: impl FnMut(&MotionStatus),
 ) -> Result<MotionStatus, RemoteError> {
     session.command(request)?;
+    std::thread::sleep(LOOK);
+    until_rest(session, &mut each)
+}
+
+/// Waits until the axes rest.
+///
+/// # Errors
+/// The line breaks.
+pub fn rest(session: &mut Session) -> Result<MotionStatus, RemoteError> {
+    until_rest(session, &mut |_| {})
+}
+
+fn until_rest(
+    session: &mut Session,
+    each: &mut impl FnMut(&MotionStatus),
+) -> Result<MotionStatus, RemoteError> {
     loop {
-        std::thread::sleep(LOOK);
         let motion = session.motion()?;
         if motion.activity == Activity::Rest {
             return Ok(motion);
         }
         each(&motion);
+        std::thread::sleep(LOOK);
     }
 }
 
@@ -53,6 +69,10 @@ pub fn failure(motion: &MotionStatus) -> Option<(String, &'static str)> {
         MotionEnd::LimitSwitch => (
             format!("{lines} stopped the motion"),
             "jog away from it; once homed, the travel of the profile keeps the axes off the switches",
+        ),
+        MotionEnd::Door => (
+            "the safety door was opened: the axes have stopped along their ramp".to_owned(),
+            "close it and ask again; while it is open, axes move at 33 mm/s at most",
         ),
         MotionEnd::DrivesOff => (
             "the drives went off: emergency stop or drive fault".to_owned(),

@@ -2,7 +2,9 @@
 
 use std::time::Duration;
 
-use protocol::message::{Configuration, OVERRIDE_NORMAL_PERCENT, Request, SafetyStatus, Status};
+use protocol::message::{
+    Configuration, OVERRIDE_NORMAL_PERCENT, PauseCause, Request, SafetyStatus, SpindleOrder, Status, Turning,
+};
 
 use super::session::{Event, RemoteError, Session};
 
@@ -75,6 +77,11 @@ pub trait Operator {
         let _ = status;
     }
 
+    /// The board has paused the run by itself, for this reason.
+    fn paused(&mut self, cause: &'static str) {
+        let _ = cause;
+    }
+
     /// What came of it: how the board was then, or that it refused.
     fn told(&mut self, request: &Request, came: Result<Status, RemoteError>);
 }
@@ -86,6 +93,8 @@ pub(super) struct Following<'a> {
     pub(super) commanded: bool,
     /// The feed override is 0.
     no_feed: bool,
+    /// Why the board has paused by itself, as the operator was told.
+    paused: PauseCause,
 }
 
 impl<'a> Following<'a> {
@@ -99,6 +108,7 @@ impl<'a> Following<'a> {
             operator,
             commanded: false,
             no_feed: false,
+            paused: PauseCause::None,
         };
         if let Some(operator) = &mut following.operator {
             let status = session.status()?;
@@ -137,6 +147,24 @@ impl<'a> Following<'a> {
             if let Some(event) = session.poll()? {
                 return Ok(event);
             }
+            if session.paused() != std::mem::replace(&mut self.paused, session.paused())
+                && self.paused != PauseCause::None
+            {
+                self.commanded = true;
+                operator.paused(cause(self.paused));
+            }
+        }
+    }
+}
+
+/// Why a board pauses a run by itself, and what to do.
+#[must_use]
+pub const fn cause(cause: PauseCause) -> &'static str {
+    match cause {
+        PauseCause::None => "by the operator",
+        PauseCause::Door => "the safety door was opened; close it, and resume",
+        PauseCause::BelowSpeed => {
+            "the spindle fell below its speed, and is off; look for the cause, and resume"
         }
     }
 }
@@ -188,6 +216,18 @@ pub fn act(session: &mut Session, request: &Request) -> Result<Status, RemoteErr
     session.status()
 }
 
+/// Spindle and coolant in words.
+#[must_use]
+pub fn spindle_words(order: SpindleOrder) -> String {
+    let coolant = if order.coolant { "on" } else { "off" };
+    let rpm = order.rpm;
+    match order.turning {
+        Turning::Off => format!("spindle off, coolant {coolant}"),
+        Turning::Clockwise => format!("spindle clockwise at {rpm} 1/min, coolant {coolant}"),
+        Turning::Counterclockwise => format!("spindle counterclockwise at {rpm} 1/min, coolant {coolant}"),
+    }
+}
+
 /// The safety state in sentences, asserted inputs first.
 #[must_use]
 pub fn sentences(safety: &SafetyStatus) -> Vec<String> {
@@ -207,6 +247,12 @@ pub fn sentences(safety: &SafetyStatus) -> Vec<String> {
     };
     said.push(format!("drives {drives}, {home}"));
     said.push(format!("feed override {} %", safety.feed_override));
+    if safety.spindle != SpindleOrder::OFF {
+        said.push(spindle_words(safety.spindle));
+    }
+    if safety.pause != PauseCause::None {
+        said.push(format!("paused: {}", cause(safety.pause)));
+    }
     if safety.link_timed_out {
         said.push("the host was gone during the run".to_owned());
     }

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use protocol::frame::{DELIMITER, Decoder, FRAME_MAX, write_request};
 use protocol::message::{
-    Capabilities, Clock, Journal, MotionStatus, Offsets, Profile, Reason, Reply, Request, Status,
+    Capabilities, Clock, Journal, MotionStatus, Offsets, PauseCause, Profile, Reason, Reply, Request, Status,
     next_number, read_reply,
 };
 use protocol::version::{PROTOCOL_VERSION, VersionMismatch};
@@ -76,6 +76,9 @@ pub enum RemoteError {
     /// The run stands still while the host waits for its end.
     #[error("the run is held: the board took this host for gone, or another one held it")]
     Held,
+    /// The board has paused the run by itself, and nobody is there to resume it.
+    #[error("the run is paused: {0}")]
+    Paused(&'static str),
     /// The board drives its axes by other settings than the job's.
     #[error("the board reports other steps per millimetre, directions or pulse times than the job's")]
     OtherSteps,
@@ -120,6 +123,8 @@ pub struct Session {
     is_damaged: bool,
     /// The pass with which the runs of the loaded job begin.
     first_pass: u32,
+    /// Why the board had paused by itself in the last status.
+    paused: PauseCause,
 }
 
 fn name(request: &Request) -> &'static str {
@@ -152,6 +157,8 @@ fn name(request: &Request) -> &'static str {
         Request::Probe { .. } => "the probe move",
         Request::Motion => "the position of the axes",
         Request::Spindle(_) => "spindle and coolant",
+        Request::Turn { .. } => "the spindle",
+        Request::Coolant { .. } => "the coolant",
         Request::Pause => "the pause",
         Request::StartAt { .. } => "the start at a pass",
         Request::Journal => "the journal",
@@ -183,6 +190,7 @@ impl Session {
             tries: 0,
             is_damaged: false,
             first_pass: 0,
+            paused: PauseCause::None,
         };
         // Terminates a partial frame left by noise or by an earlier host.
         session.stream.write_all(&[DELIMITER])?;
@@ -221,6 +229,12 @@ impl Session {
     #[must_use]
     pub fn keep_alive(&self) -> Option<Duration> {
         self.keep_alive
+    }
+
+    /// Why the board had paused the run by itself, by its last status.
+    #[must_use]
+    pub const fn paused(&self) -> PauseCause {
+        self.paused
     }
 
     /// Whether [`Self::event`] requests no status however long no event comes: then nothing but the run takes the board's time.
@@ -263,6 +277,7 @@ impl Session {
             Reply::Status { status, .. } => {
                 self.events.announce(status.events);
                 self.has_room(status.stream.room);
+                self.paused = status.safety.pause;
                 Ok(status)
             }
             Reply::Nak { reason, .. } => Err(RemoteError::Refused {
@@ -529,7 +544,10 @@ impl Session {
         }
         // In lockstep the host itself lets time pass, held or not.
         if state == State::Held && status.clock == Clock::Free && !self.patient {
-            return Err(RemoteError::Held);
+            return Err(match status.safety.pause {
+                PauseCause::None => RemoteError::Held,
+                cause => RemoteError::Paused(super::operate::cause(cause)),
+            });
         }
         if state.is_under_way() {
             self.heard = Instant::now();
