@@ -30,6 +30,10 @@ const WITHIN_LIMITS: &str = "tick 40: hold\ntick 200: resume\ntick 900: override
     tick 1500: resume\ntick 2200: override 0\ntick 2600: override 120\ntick 3000: hold\ntick 3003: resume\ntick 3400: abort\n\
     tick 3600: start\ntick 3700: override 100\ntick 6000: hold\ntick 6400: stop\n";
 
+/// Pauses on a pass, in its way up, taken back while the tool slows down, and stopped above the surface by the end of another one; the run finishes.
+const PAUSED: &str = "tick 1300: pause\ntick 4000: resume\ntick 4700: pause\ntick 4703: resume\ntick 5400: override 60\ntick 5600: pause\n\
+    tick 5800: hold\ntick 6100: resume\ntick 9000: override 100\ntick 9001: resume\n";
+
 fn torus_file() -> Job {
     let path = format!("{}/../jobs/torus.toml", env!("CARGO_MANIFEST_DIR"));
     job_file::load(path.as_ref()).unwrap()
@@ -130,9 +134,26 @@ fn a_run_held_and_resumed_is_the_run_without() {
     assert_eq!(schedule.ends, [2500, 9100]);
 }
 
+/// Times at which a run comes to the safe height.
+fn rises(job: &Prepared, script: &str) -> usize {
+    let (.., path) = here(job, &Script::parse("script", script).unwrap());
+    let safe_z_nm = job.header.axes.unwrap().safe_z_nm;
+    path.windows(2)
+        .filter(|two| two[0][2] < safe_z_nm && two[1][2] >= safe_z_nm)
+        .count()
+}
+
+/// The script's pauses do leave the surface, twice.
+#[test]
+fn the_pauses_of_the_script_lift_the_tool() {
+    let job = torus_within_limits();
+    assert_eq!(rises(&job, PAUSED), rises(&job, "") + 2);
+}
+
 /// Runs the scripts one after the other on one board; returns the periods missed in each.
-fn all_the_same(session: &mut Session) -> [u32; 4] {
+fn all_the_same(session: &mut Session) -> [u32; 5] {
     [
+        same(session, &torus_within_limits(), PAUSED, State::Finished),
         same(session, &torus(), SCRIPT, State::Ready),
         same(session, &torus_within_limits(), WITHIN_LIMITS, State::Ready),
         same(session, &torus_within_limits(), "", State::Finished),
@@ -148,12 +169,12 @@ fn a_script_does_the_same_behind_a_line() {
     };
     assert_eq!(
         all_the_same(&mut Session::open(Box::new(board), 1).unwrap()),
-        [0; 4]
+        [0; 5]
     );
 }
 
 #[test]
 fn a_script_does_the_same_in_qemu() {
     let (_qemu, stream) = Qemu::start(images::for_qemu()).unwrap();
-    assert_eq!(all_the_same(&mut Session::open(stream, 1).unwrap()), [0; 4]);
+    assert_eq!(all_the_same(&mut Session::open(stream, 1).unwrap()), [0; 5]);
 }
