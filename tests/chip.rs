@@ -8,6 +8,7 @@ mod attached;
 mod card;
 mod disturbed;
 mod emulated;
+mod guide;
 mod levels;
 mod machine;
 mod pulses;

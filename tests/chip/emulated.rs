@@ -62,6 +62,11 @@ fn built() -> &'static Built {
     })
 }
 
+/// The tool.
+pub(super) fn tool() -> PathBuf {
+    built().sim.clone()
+}
+
 /// Runs the tool with these arguments and an empty standard input. Returns whether it succeeded, and its output.
 pub(super) fn sim<S: AsRef<std::ffi::OsStr>>(arguments: impl IntoIterator<Item = S>) -> (bool, String) {
     sim_typed(arguments, "")
@@ -176,6 +181,12 @@ impl Emulated {
     /// Starts an execution that records every change of the outputs.
     pub(super) fn recorded(board: &'static Board, arguments: &[&str]) -> Self {
         Self::begin(board, &[&["--fast"], arguments].concat(), true)
+    }
+
+    /// An event that happens now: an input of the board's table, as `door` or `x-min=closed`.
+    pub(super) fn happen(&mut self, event: &str) {
+        let input = self.child.stdin.as_mut().unwrap();
+        writeln!(input, "{event}").and_then(|()| input.flush()).unwrap();
     }
 
     pub(super) fn port(&self) -> String {

@@ -187,28 +187,4 @@ mod tests {
         }
         assert!(keys >= 40, "{keys}");
     }
-
-    /// The job that the bring-up guide has people run in the air is within its limits and ends where it says.
-    #[test]
-    fn the_guides_job_runs() {
-        let guide = include_str!("../../../docs/bring-up.md");
-        let text = guide
-            .split("```toml\n")
-            .nth(1)
-            .unwrap()
-            .split("```")
-            .next()
-            .unwrap();
-        let (job, prepared) = direction::choose(job_file::parse("axes.toml", text).unwrap()).unwrap();
-        let mut last = [0; 3];
-        Machine::load(&prepared)
-            .unwrap()
-            .run(|sample| {
-                last = sample.cl_nm;
-                true
-            })
-            .unwrap();
-        assert_eq!(job.machine.home_mm, Some([0.0, 0.0, 60.0]));
-        assert_eq!(last, [0, 0, 60_000_000]);
-    }
 }
