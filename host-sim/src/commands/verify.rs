@@ -17,7 +17,8 @@ use super::out::{complain, say};
 use super::part_words::{Centres, PartProof};
 use super::simulate::{WantedReport, remarks, report, timed};
 use super::{
-    Bar, Failure, Result, along, error_json, load_on, motion_words, part_words, reach_words, swept_words,
+    Bar, Failure, Result, along, error_json, home, motion_words, part_words, reach_words, read_profile,
+    swept_words,
 };
 
 /// Checks a job before it runs on a machine. Every sample against an independent f64 oracle: positions, normals, feed ripple, path
@@ -39,6 +40,9 @@ pub(super) struct Arguments {
     /// Machine profile (TOML): what the job does not say of the machine is the profile's, and the job may not exceed it.
     #[arg(long, value_name = "FILE")]
     machine: Option<PathBuf>,
+    /// Places the job's origin here, mm in machine coordinates, as `run --work` does: is it within the travel there?
+    #[arg(long, value_name = "X,Y,Z", value_parser = home::position, allow_hyphen_values = true)]
+    origin: Option<home::PositionNm>,
     /// Writes a report page into this folder: 3D view, charts, figures. With several jobs: a folder for each in it.
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
@@ -330,7 +334,8 @@ fn summary(values: &[Value]) {
 
 /// Verifies one job and prints its figures unless JSON is requested. Returns whether it passed, and its JSON object.
 fn verify_job(arguments: &Arguments, path: &Path, directory: Option<&Path>) -> Result<(bool, Value)> {
-    let (job, prepared) = load_on(path, arguments.machine.as_ref())?;
+    let profile = read_profile(arguments.machine.as_ref())?;
+    let (job, prepared) = home::load(path, profile.as_ref(), arguments.origin, None)?;
     let directory = WantedReport::new(directory, arguments.force)?;
     let timed = timed(&job, &prepared)?;
     let original = original(&job)?;
