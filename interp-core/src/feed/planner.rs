@@ -53,7 +53,7 @@ const TURN_JERK: f32 = 0.88;
 const JERK_CHECKED: f32 = 0.998;
 
 /// Cycles of the pieces of work in a period's planning, by the pessimistic model of `cargo sim budget`; with the rest of the task 30 000.
-pub(crate) const PORTION_CYCLES: u32 = 25_000;
+pub(crate) const PORTION_CYCLES: u32 = 26_500;
 
 /// Cycles of one piece of work, by the same model.
 mod cycles {
