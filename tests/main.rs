@@ -43,6 +43,7 @@ mod sequences;
 mod session;
 mod settings;
 mod spindle;
+mod standing;
 mod streaming;
 mod swept;
 mod unusual_motion;

@@ -203,6 +203,10 @@ fn a_pause_comes_back_to_the_same_sample() {
             let mut paused = begun(&job, place);
             let mut with_pause = Vec::new();
             until_held(&mut paused, Command::Pause, &mut with_pause);
+            if stood.cl_nm == whole[whole.len() - 1].cl_nm {
+                // In the last moments of the way home it comes to rest there: nothing is left to leave.
+                continue;
+            }
             assert!(paused.is_lifted(), "{name}");
             let top = *with_pause.last().unwrap();
             let high = stood.cl_nm[2].max(safe_z_nm);
@@ -219,7 +223,11 @@ fn a_pause_comes_back_to_the_same_sample() {
                 .iter()
                 .position(|sample| sample.cl_nm == stood.cl_nm)
             else {
-                assert_eq!(stood.cc_nm, stood.cl_nm, "{name}: it does not come back");
+                // At the end of a pass it goes on to the next one.
+                let mut of_pass = whole.iter().rev().filter(|sample| sample.pass == stood.pass);
+                let end = of_pass.find(|sample| sample.state == State::Running);
+                let is_end = end.is_some_and(|end| end.cl_nm == stood.cl_nm);
+                assert!(is_end || stood.cc_nm == stood.cl_nm, "{name}: it does not come back");
                 continue;
             };
             let back = away + back;

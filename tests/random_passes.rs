@@ -31,12 +31,21 @@ const PLANNED_S: f64 = 0.25;
 /// The quotient that is asked of every pass.
 const WANTED: f64 = 1.05;
 
-const KINDS: [&str; 5] = ["bicubic", "C2 knots", "C1 knots", "taper", "pole"];
+pub(crate) const KINDS: [&str; 5] = ["bicubic", "C2 knots", "C1 knots", "taper", "pole"];
 
 /// A linear congruential generator: the same surfaces on each machine.
-struct Random(u64);
+pub(crate) struct Random(u64);
 
 impl Random {
+    /// A generator that has forgotten how much its seed is like another.
+    pub(crate) fn new(seed: u64) -> Self {
+        let mut random = Self(0x9e37_79b9_7f4a_7c15 ^ seed.wrapping_mul(0xd134_2543_de82_ef95));
+        for _ in 0..4 {
+            random.next();
+        }
+        random
+    }
+
     /// From -1 to 1.
     fn next(&mut self) -> f64 {
         self.0 = self
@@ -49,7 +58,7 @@ impl Random {
     }
 
     /// Between two values above 0, evenly by their ratio.
-    fn between(&mut self, low: f64, high: f64) -> f64 {
+    pub(crate) fn between(&mut self, low: f64, high: f64) -> f64 {
         low * (high / low).powf(0.5 + 0.5 * self.next())
     }
 }
@@ -144,13 +153,19 @@ fn fan(size: f64, random: &mut Random) -> SurfaceSpec {
 
 /// A case: size 5 to 60 mm, feed 10 to 100 mm/s.
 fn case(kind: &str, seed: usize) -> Job {
-    let mut random = Random(0x9e37_79b9_7f4a_7c15_u64 ^ (seed as u64).wrapping_mul(0xd134_2543_de82_ef95));
-    for _ in 0..4 {
-        random.next();
-    }
+    let mut random = Random::new(seed as u64);
     let size = random.between(5.0, 60.0);
+    sized(kind, seed, size, &mut random)
+}
+
+/// A case of this size, mm.
+pub(crate) fn case_of_size(kind: &str, seed: usize, size: f64) -> Job {
+    sized(kind, seed, size, &mut Random::new(seed as u64))
+}
+
+fn sized(kind: &str, seed: usize, size: f64, random: &mut Random) -> Job {
     let mut job = bumpy_job(seed);
-    job.surface = surface(kind, size, &mut random);
+    job.surface = surface(kind, size, random);
     job.side = Side::Up;
     job.pattern = Pattern::Zigzag;
     job.along = if random.next() > 0.0 { Along::U } else { Along::V };

@@ -35,7 +35,7 @@ const STEPS_SOME: u8 = 7;
 /// Periods that a step of the method takes for each node and apart from them, the check for each period of the plan, and what is left.
 const PERIODS_A_STEP: f32 = 0.27;
 const PERIODS_OF_STEP: f32 = 3.0;
-const PERIODS_A_PLACE: f32 = 0.07;
+const PERIODS_A_PLACE: f32 = 0.073;
 const PERIODS_LEFT: f32 = 3.0;
 
 /// Share of the greatest factor of the walk's pace that the method starts from.
@@ -93,6 +93,17 @@ enum Stage {
     Gate,
 }
 
+/// What the time of a planning is held against, periods.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Deadlines {
+    /// Periods of the planning so far.
+    pub(crate) spent: u32,
+    /// Least duration of the plan: that of its planning so far, which the planning of the next one will take, too. 0 where the tool may wait for that.
+    pub(crate) least: u32,
+    /// What is left until the plan is needed. None where the tool may wait for it.
+    pub(crate) left: Option<f32>,
+}
+
 /// The planning of one path.
 #[derive(Clone, Debug)]
 pub(crate) struct Planner {
@@ -111,6 +122,10 @@ pub(crate) struct Planner {
     weight: f32,
     factor: f32,
     reach: Reach,
+    /// Periods that the motion takes at the draft's pace; those of planning when the last step was taken, and from the one before it.
+    lasts: f32,
+    taken: u32,
+    of_step: u32,
     /// The check's place, what the plan uses so far, and periods.
     cursor: Cursor,
     most: Use,
@@ -137,6 +152,9 @@ impl Planner {
         cursor: Cursor::START,
         most: Use::NONE,
         periods: 0,
+        lasts: 0.0,
+        taken: 0,
+        of_step: 0,
         lead: Lead::NONE,
         gate: GateSearch::START,
     };
@@ -165,6 +183,19 @@ impl Planner {
         self.stage == Stage::Done
     }
 
+    /// Periods that the rest of the planning takes at least, once the method has begun.
+    pub(crate) fn least_left(&self, plan: &Plan) -> f32 {
+        let (steps, checked) = match self.stage {
+            Stage::Walk | Stage::Weigh | Stage::Finish | Stage::Gate | Stage::Done => return 0.0,
+            Stage::Factor | Stage::Scale | Stage::Assemble | Stage::Solve | Stage::Reach | Stage::Take => {
+                (STEPS_FIRST.saturating_sub(self.step), 0)
+            }
+            Stage::Check => (0, self.periods),
+        };
+        let check = PERIODS_A_PLACE * (self.lasts - to_f32(checked)).at_least(0.0) + PERIODS_LEFT;
+        f32::from(steps) * self.periods_of_step(plan) + check
+    }
+
     /// Cycles of the next piece of work.
     pub(crate) fn cycles(&self, plan: &Plan) -> u32 {
         let jump = if self.sweep.has_jump(plan) {
@@ -187,8 +218,9 @@ impl Planner {
         }
     }
 
-    /// One piece of work. `least`: periods that the plan has to take at least.
-    pub(crate) fn work(&mut self, plan: &mut Plan, least: u32) {
+    /// One piece of work.
+    pub(crate) fn work(&mut self, plan: &mut Plan, deadlines: Deadlines) {
+        let least = deadlines.least;
         self.stage = match self.stage {
             Stage::Walk => {
                 if self.walker.work(&mut self.lists, plan, &self.limits, least) {
@@ -216,6 +248,7 @@ impl Planner {
             }
             Stage::Scale => {
                 let factor = START_SHARE * self.factor.at_least(1e-9);
+                self.lasts *= inverse_sqrt(factor);
                 if plan.pinned() == [0; 2] {
                     for pace in draft_mut(&mut self.lists).iter_mut().take(COEFFICIENTS) {
                         *pace *= factor;
@@ -257,7 +290,7 @@ impl Planner {
                     Stage::Reach
                 }
             }
-            Stage::Take => self.take(plan, least),
+            Stage::Take => self.take(plan, deadlines),
             Stage::Check => {
                 if self.check(plan) {
                     Stage::Finish
@@ -285,9 +318,18 @@ impl Planner {
         };
     }
 
-    /// Steps that there is time for. From rest to rest the plan is slowed down to what its planning takes, so one that comes too late makes it slower.
-    /// `lasts`: periods of the motion; `least`: those of the planning so far, 0 where they do not matter.
-    fn steps_left(&self, plan: &Plan, lasts: f32, least: u32) -> u16 {
+    /// Periods that a step of the method takes: as many as the last one, if there is one.
+    fn periods_of_step(&self, plan: &Plan) -> f32 {
+        if self.step > 1 {
+            to_f32(self.of_step) + 1.0
+        } else {
+            PERIODS_A_STEP * f32::from(plan.intervals) + PERIODS_OF_STEP
+        }
+    }
+
+    /// Steps that there is time for. From rest to rest the plan is slowed down to what its planning takes, so one that comes too late makes it slower; and
+    /// the tool stands where the pass before is over first. `lasts`: periods of the motion.
+    fn steps_left(&self, plan: &Plan, lasts: f32, Deadlines { least, left, .. }: Deadlines) -> u16 {
         let most = if plan.pinned() == [0; 2] {
             STEPS_MAX
         } else if self.walker.is_short {
@@ -296,24 +338,28 @@ impl Planner {
             STEPS
         };
         let most_left = u16::from(most.saturating_sub(self.step));
-        if least == 0 || most < STEPS_MAX {
+        if most < STEPS_MAX {
             return most_left;
         }
-        let left = (1.0 - PERIODS_A_PLACE) * lasts - PERIODS_LEFT - to_f32(least);
-        let of_step = PERIODS_A_STEP * f32::from(plan.intervals) + PERIODS_OF_STEP;
-        let steps = u16::try_from(truncated(left.at_least(0.0) / of_step)).unwrap_or(u16::MAX);
-        steps.min(most_left)
+        let own = if least == 0 {
+            f32::MAX
+        } else {
+            lasts - to_f32(least)
+        };
+        let left = own.at_most(left.unwrap_or(f32::MAX)) - PERIODS_A_PLACE * lasts - PERIODS_LEFT;
+        let steps = (left.at_least(0.0) / self.periods_of_step(plan)).at_most(f32::from(most_left));
+        u16::try_from(truncated(steps)).unwrap_or(most_left)
     }
 
     /// Whether another step is to be taken; chooses its barrier.
-    fn goes_on(&mut self, plan: &Plan, least: u32) -> bool {
+    fn goes_on(&mut self, plan: &Plan, deadlines: Deadlines) -> bool {
         if self.step < STEPS_FIRST {
             return true;
         }
-        let lasts = self.lasts(plan);
+        let lasts = self.lasts;
         let went = self.reach.step();
         let is_solved = self.barrier <= BARRIER_LAST && went >= 1.0;
-        if is_solved || self.steps_left(plan, lasts, least) == 0 {
+        if is_solved || self.steps_left(plan, lasts, deadlines) == 0 {
             return false;
         }
         let change = if went > WENT_FAR {
@@ -328,7 +374,7 @@ impl Planner {
             0..STEPS_SOME => LASTS,
             _ => 1.0,
         };
-        let most = if self.steps_left(plan, share * lasts, least) <= STEPS_AT_END {
+        let most = if self.steps_left(plan, share * lasts, deadlines) <= STEPS_AT_END {
             BARRIER_AT_END
         } else {
             BARRIER_FIRST
@@ -357,17 +403,21 @@ impl Planner {
             sum += inverse_sqrt(pace.at_least(1e-9));
         }
         self.weight = 1.0 / sum.at_least(1e-9);
+        self.lasts = sum * plan.step_s / plan.limits.period;
         self.factor = f32::MAX;
         (self.step, self.barrier) = (0, BARRIER_FIRST);
         self.sweep = Sweep::START;
     }
 
     /// Takes the step that was solved for, and begins the next, or the check.
-    fn take(&mut self, plan: &mut Plan, least: u32) -> Stage {
+    fn take(&mut self, plan: &mut Plan, deadlines: Deadlines) -> Stage {
         newton::take(plan, &mut self.lists, self.reach.step());
         newton::clear(&mut self.lists);
         self.step += 1;
-        if self.goes_on(plan, least) {
+        self.of_step = deadlines.spent.saturating_sub(self.taken);
+        self.taken = deadlines.spent;
+        self.lasts = self.lasts(plan);
+        if self.goes_on(plan, deadlines) {
             return Stage::Assemble;
         }
         self.begin_check(plan);

@@ -8,7 +8,7 @@ use super::follow::Follower;
 use super::limits::MotionLimits;
 use super::pace::{Course, Pace};
 use super::plan::Plan;
-use super::planner::Planner;
+use super::planner::{Deadlines, Planner};
 use super::profile::Profiles;
 use super::stations::Station;
 use crate::job::AxisLimits;
@@ -130,9 +130,15 @@ impl Path {
             }
         }
         let mut planner = Box::new(Planner::IDLE);
+        // It may be waited for.
+        let deadlines = Deadlines {
+            spent: 0,
+            least: 0,
+            left: None,
+        };
         planner.begin(&mut plan);
         while !planner.is_done() {
-            planner.work(&mut plan, 0);
+            planner.work(&mut plan, deadlines);
         }
         plan
     }

@@ -125,6 +125,10 @@ pub(crate) struct Sequencer {
     spent_last: u32,
     front_spent: u32,
     front_last: u32,
+    /// Periods of the present pass's plan that are over.
+    passed: f32,
+    /// Greatest pace until the next pass is planned, where the planning would last longer than the present one.
+    wait_pace: f32,
     /// Feed factor of the last period.
     feed_factor: f32,
     /// The tool's position, once it is known.
@@ -177,6 +181,8 @@ impl Sequencer {
         spent_last: 0,
         front_spent: 0,
         front_last: 0,
+        passed: 0.0,
+        wait_pace: f32::MAX,
         feed_factor: 1.0,
         at: None,
         has_first_patch: false,
@@ -218,6 +224,7 @@ impl Sequencer {
         self.feed_factor = 1.0;
         (self.front_spent, self.front_last) = (0, 0);
         self.spent_last = 0;
+        self.wait_pace = f32::MAX;
         self.has_to_choose = false;
         let (_, next) = both(&mut self.plans, self.second);
         next.route = first;

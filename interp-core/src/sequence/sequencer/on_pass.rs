@@ -55,6 +55,7 @@ impl Sequencer {
     /// Resets what belongs to a pass, and requests the link to the next one.
     pub(in crate::sequence) fn start_pass(&mut self, job: &Job<'_>) {
         self.has_first_patch = true;
+        self.passed = 0.0;
         let (now, _) = both(&mut self.plans, self.second);
         self.cell = [0; 2];
         self.correction = None;
@@ -89,7 +90,7 @@ impl Sequencer {
             }
             !run.is_along()
         } else {
-            let wanted = now.pace(command.feed_factor);
+            let wanted = now.pace(command.feed_factor).at_most(self.wait_pace);
             let next_pace = self.next_pace();
             let wanted = self.pace_before_turn(wanted, next_pace);
             self.pace.want(wanted, command.is_fault);
@@ -100,6 +101,7 @@ impl Sequencer {
                 return Err(fault);
             }
             let pace = self.pace.tick(&mut self.profiles);
+            self.passed += pace;
             let (now, _) = both(&mut self.plans, self.second);
             let moved = if pace > 0.0 {
                 self.follower.tick(&now.plan, pace)

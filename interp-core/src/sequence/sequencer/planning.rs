@@ -4,7 +4,7 @@ use super::{Phase, Planning, Sequencer, both};
 use crate::fault::{Fault, FaultKind};
 use crate::feed::MM_PER_Q10;
 use crate::feed::limits::MotionLimits;
-use crate::feed::planner::PORTION_CYCLES;
+use crate::feed::planner::{Deadlines, PORTION_CYCLES};
 use crate::feed::turn::Turn;
 use crate::job::links::Link;
 use crate::job::program::{Job, Program};
@@ -38,6 +38,11 @@ const LEG_CYCLES: u32 = 5_000;
 
 /// Greatest number of pieces of work in a period: the shortest is the step to the next station.
 const PIECES_MAX: u32 = 36;
+
+/// Share of the pace at which the tool would reach the pass's end with the check of the next plan, which the change of the pace and its search leave; and
+/// the least pace.
+const WAIT_SHARE: f32 = 0.6;
+const WAIT_PACE_MIN: f32 = 0.02;
 
 /// Feed above that of a plan for which it is planned anew, as a ratio.
 const REPLANNED: f32 = 1.001;
@@ -355,8 +360,35 @@ impl Sequencer {
                 } else {
                     0
                 };
-                self.planner.work(&mut next.plan, least);
+                let is_reached_on_surface = next.pass > self.first_pass
+                    && !job.header.spacing.is_constant()
+                    && (now.steps_over || job.link_to(next.pass, axes) == Link::Straight);
+                let left = is_reached_on_surface.then(|| {
+                    let passed = if self.phase == Phase::Pass {
+                        self.passed
+                    } else {
+                        0.0
+                    };
+                    (count_to_f32(now.plan.periods) - passed - count_to_f32(SPARE_PERIODS)).at_least(0.0)
+                });
+                if let Some(left) = left
+                    && self.wait_pace == f32::MAX
+                {
+                    let needed = self.planner.least_left(&next.plan);
+                    if needed > left {
+                        self.wait_pace = (WAIT_SHARE * left / needed).at_least(WAIT_PACE_MIN);
+                    }
+                }
+                self.planner.work(
+                    &mut next.plan,
+                    Deadlines {
+                        spent: self.spent,
+                        least,
+                        left,
+                    },
+                );
                 if self.planner.is_done() {
+                    self.wait_pace = f32::MAX;
                     self.planning = Planning::Complete;
                     if next.turns() && is_too_slow(next) {
                         self.lookahead.avoid_turns();
