@@ -227,7 +227,10 @@ fn a_pause_comes_back_to_the_same_sample() {
                 let mut of_pass = whole.iter().rev().filter(|sample| sample.pass == stood.pass);
                 let end = of_pass.find(|sample| sample.state == State::Running);
                 let is_end = end.is_some_and(|end| end.cl_nm == stood.cl_nm);
-                assert!(is_end || stood.cc_nm == stood.cl_nm, "{name}: it does not come back");
+                assert!(
+                    is_end || stood.cc_nm == stood.cl_nm,
+                    "{name}: it does not come back"
+                );
                 continue;
             };
             let back = away + back;

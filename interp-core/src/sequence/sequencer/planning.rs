@@ -127,6 +127,10 @@ impl Sequencer {
         let mut makes_front = false;
         for _ in 0..PIECES_MAX {
             let (is_front, cycles) = self.next_cycles(run);
+            debug_assert!(
+                cycles <= PORTION_CYCLES,
+                "a piece of {cycles} cycles never has its turn"
+            );
             if cycles == 0 || cycles > left {
                 break;
             }
