@@ -1,11 +1,12 @@
 //! Resolves the faces of jobs with `kind = "file"`.
 
+use std::collections::HashMap;
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use glam::DVec3;
 use job::CadSource;
-use job_file::{Face, FaceError, FaceSurface};
+use job_file::{Face, FaceError};
 
 use crate::{CadError, Form, MachinableFace, Model, Options, machinable, read_once};
 
@@ -57,7 +58,8 @@ impl Original {
             untrimmed: source.untrimmed,
             around_mm: source.around_mm,
         };
-        let made = machinable(&source.path.display().to_string(), face, &options)?;
+        let file = source.path.display().to_string();
+        let made = machinable_once(&file, &model, source.face, &options)?;
         Ok(matches!(made.form, Form::Fitted { .. }).then(|| Self {
             surface: face.surface.clone(),
             scale: source.scale,
@@ -71,20 +73,53 @@ impl Original {
     }
 }
 
-/// The surface of a face that a job asks for, and whether the face is less of it.
+/// The surface of a face that a job asks for. Those of the last model are kept: a job asks for its surface, its region and its original.
 ///
 /// # Errors
 /// The face cannot be machined.
-pub fn surface_of(wanted: &Face, face: &crate::Face) -> Result<(MachinableFace, FaceSurface), FaceError> {
+pub fn surface_of(wanted: &Face, model: &Arc<Model>) -> Result<Arc<MachinableFace>, FaceError> {
     let options = Options {
         tolerance_mm: wanted.tolerance_mm,
         untrimmed: wanted.untrimmed,
         around_mm: wanted.around_mm,
     };
-    let made = machinable(&wanted.path.display().to_string(), face, &options)?;
-    let surface = FaceSurface {
-        surface: made.spec(),
-        trimmed: made.trimmed.is_some(),
-    };
-    Ok((made, surface))
+    let file = wanted.path.display().to_string();
+    Ok(machinable_once(&file, model, wanted.number, &options)?)
+}
+
+/// [`machinable`] of a face of a model, by its number, once for the same options.
+///
+/// # Errors
+/// As [`machinable`].
+pub fn machinable_once(
+    file: &str,
+    model: &Arc<Model>,
+    number: usize,
+    options: &Options,
+) -> Result<Arc<MachinableFace>, CadError> {
+    type Key = (usize, u64, bool, u64);
+    type Last = Option<(Arc<Model>, HashMap<Key, Arc<MachinableFace>>)>;
+    static LAST: Mutex<Last> = Mutex::new(None);
+    let lock = || LAST.lock().unwrap_or_else(PoisonError::into_inner);
+    let key = (
+        number,
+        options.tolerance_mm.to_bits(),
+        options.untrimmed,
+        options.around_mm.to_bits(),
+    );
+    if let Some((of, made)) = lock().as_ref()
+        && Arc::ptr_eq(of, model)
+        && let Some(made) = made.get(&key)
+    {
+        return Ok(Arc::clone(made));
+    }
+    let made = Arc::new(machinable(file, &model.faces[number - 1], options)?);
+    let mut last = lock();
+    match last.as_mut() {
+        Some((of, all)) if Arc::ptr_eq(of, model) => {
+            all.insert(key, Arc::clone(&made));
+        }
+        _ => *last = Some((Arc::clone(model), HashMap::from([(key, Arc::clone(&made))]))),
+    }
+    Ok(made)
 }

@@ -12,8 +12,12 @@ const SEEDS: usize = 3;
 const SEEDS_MAX: usize = 96;
 /// A point found from a guess is this close to the surface, mm; otherwise the whole surface is searched.
 const FOUND_MM: f64 = 1e-4;
+/// Edges of files lie this far off their surface, mm: a nearest place within it is the one that was meant.
+const MEANT_MM: f64 = 0.01;
 /// Newton iterations from the best seed.
 const STEPS: usize = 40;
+/// A place is the nearest one where the gap along either parameter is below this, mm.
+const NEAREST_MM: f64 = 1e-10;
 /// Largest number of halvings of a step that does not reduce the distance.
 const HALVINGS: i32 = 16;
 
@@ -27,14 +31,16 @@ impl Surface {
             _ => self.seed(to),
         };
         let mut found = self.refined(start, to);
-        if near.is_some() && !self.closed_form() && found.1 > FOUND_MM {
+        let within = if found.is_nearest { MEANT_MM } else { FOUND_MM };
+        if near.is_some() && !self.closed_form() && found.off_mm > within {
             // Points on the surface are found from the guess; if that fails, the whole surface is searched.
             start = self.seed(to);
             let afresh = self.refined(start, to);
-            if afresh.1 < 0.5 * found.1 {
+            if afresh.off_mm < 0.5 * found.off_mm {
                 found = afresh;
             }
         }
+        let mut found = (found.place, found.off_mm);
         if let Some(near) = near {
             for (k, period) in self.periods().into_iter().enumerate() {
                 if let Some(period) = period {
@@ -165,7 +171,7 @@ impl Surface {
     }
 
     /// Newton's method on the distance, within the domain; no step increases the distance.
-    fn refined(&self, start: [f64; 2], to: DVec3) -> ([f64; 2], f64) {
+    fn refined(&self, start: [f64; 2], to: DVec3) -> Found {
         let (domain, periods) = (self.domain(), self.periods());
         let held = |place: [f64; 2]| -> [f64; 2] {
             std::array::from_fn(|k| match (domain[k], periods[k]) {
@@ -179,11 +185,24 @@ impl Surface {
         };
         let mut place = held(start);
         let mut gap = self.at(place[0], place[1]).point - to;
+        let mut is_nearest = false;
         for _ in 0..STEPS {
             let at = self.at(place[0], place[1]);
             gap = at.point - to;
             let slope = [gap.dot(at.u), gap.dot(at.v)];
             let near = [at.u.length_squared(), at.u.dot(at.v), at.v.length_squared()];
+            // The gap has no part along the parameter, or the domain ends there.
+            let ends = |k: usize| {
+                let at_end = |[low, high]: [f64; 2]| {
+                    place[k] <= low && slope[k] > 0.0 || place[k] >= high && slope[k] < 0.0
+                };
+                slope[k].abs() <= NEAREST_MM * near[2 * k].sqrt()
+                    || periods[k].is_none() && domain[k].is_some_and(at_end)
+            };
+            is_nearest = ends(0) && ends(1);
+            if is_nearest {
+                break;
+            }
             let bent = [gap.dot(at.uu), gap.dot(at.uv), gap.dot(at.vv)];
             let exact = std::array::from_fn(|k| near[k] + bent[k]);
             // Newton, Gauss-Newton, then each parameter alone (at a degenerate point): the first that reduces the distance.
@@ -203,8 +222,21 @@ impl Surface {
             let Some((next, new)) = moved else { break };
             (place, gap) = (next, new);
         }
-        (place, gap.length())
+        Found {
+            place,
+            off_mm: gap.length(),
+            is_nearest,
+        }
     }
+}
+
+/// A place by Newton's method.
+struct Found {
+    place: [f64; 2],
+    /// Distance from the point, mm.
+    off_mm: f64,
+    /// No place beside it is nearer.
+    is_nearest: bool,
 }
 
 /// Solution of a symmetric system of two equations `h x = -slope`, if it is positive definite.

@@ -38,7 +38,7 @@ mod trim_tests;
 
 pub use curve::Curve;
 pub use error::CadError;
-pub use faces::{Original, model_with, surface_of};
+pub use faces::{Original, machinable_once, model_with, surface_of};
 pub use fit::Deviation;
 pub use interpolation::interpolation_error_mm;
 pub use job::{FEED_MM_MIN, JobOptions, JobText, LIMITS, machined_sign, write_job};

@@ -60,14 +60,17 @@ pub fn read_once(path: &Path) -> Result<Arc<Model>, CadError> {
     let state = std::fs::metadata(path)
         .and_then(|data| Ok((data.modified()?, data.len())))
         .ok();
-    let lock = || LAST.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-    if let (Some((file, modified, length, model)), Some(now)) = (lock().as_ref(), state)
-        && (file.as_path(), *modified, *length) == (path, now.0, now.1)
+    // A job names the file from its own folder.
+    let whole = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    // Held while it reads: the faces of a part are asked for on all cores.
+    let mut last = LAST.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+    if let (Some((file, modified, length, model)), Some(now)) = (last.as_ref(), state)
+        && (file, *modified, *length) == (&whole, now.0, now.1)
     {
         return Ok(Arc::clone(model));
     }
     let model = Arc::new(read(path)?);
-    *lock() = state.map(|(modified, length)| (path.to_owned(), modified, length, Arc::clone(&model)));
+    *last = state.map(|(modified, length)| (whole, modified, length, Arc::clone(&model)));
     Ok(model)
 }
 

@@ -80,11 +80,14 @@ impl Axis {
     /// Index of the first pole with influence at `t`, and the basis functions with two derivatives (P&T A2.2, eqn 2.9).
     pub(super) fn basis(&self, t: f64, side: Side) -> (usize, Basis) {
         let (p, span) = (self.degree, self.span(t, side));
-        let mut lower = [[0.0; ORDER_MAX]; 3];
+        let (mut one, mut two) = ([[0.0; ORDER_MAX]; 3], [[0.0; ORDER_MAX]; 3]);
+        let (mut lower, mut next) = (&mut one, &mut two);
         lower[0][0] = 1.0;
         for d in 1..=p {
             let derived = d + 2 > p;
-            let mut next = [[0.0; ORDER_MAX]; 3];
+            for functions in next.iter_mut() {
+                functions[..=d].fill(0.0);
+            }
             for r in 0..d {
                 // The support of function r of degree d - 1 is [knots[span - d + 1 + r], knots[span + 1 + r]].
                 let (low, high) = (self.knots[span + 1 + r - d], self.knots[span + 1 + r]);
@@ -102,9 +105,9 @@ impl Axis {
                     }
                 }
             }
-            lower = next;
+            (lower, next) = (next, lower);
         }
-        (span - p, lower)
+        (span - p, *lower)
     }
 
     /// The parameter, set to a knot that it equals to rounding.

@@ -153,6 +153,12 @@ impl Part {
         self.faces.get(face).map_or(&self.whole, |face| &face.inside)
     }
 
+    /// The edges of a face.
+    pub(crate) fn edges_of(&self, face: usize) -> Vec<[DVec3; 2]> {
+        let own = self.edges.iter().filter(|(_, of)| *of as usize == face);
+        own.map(|(ends, _)| *ends).collect()
+    }
+
     /// Number of cells and of edges.
     #[must_use]
     pub fn size(&self) -> [usize; 2] {
@@ -186,7 +192,7 @@ impl Part {
             let face = face as usize;
             let is_own = own.is_some_and(|own| own.face == face && own.place.distance(place) < own.radius);
             if distance < *bound && !is_own {
-                *bound = distance;
+                *bound = if any { 0.0 } else { distance };
                 found = Some(Near { distance, face });
             }
         });

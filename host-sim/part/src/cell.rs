@@ -36,6 +36,10 @@ struct Quad {
 pub(crate) trait Measure {
     /// The distance of a triangle and the weights of the nearest point; its height may be off by `slack`.
     fn triangle(&self, corners: [DVec3; 3], slack: f64) -> Option<(f64, [f64; 2])>;
+    /// A distance that the cell is surely within, where this one is to its triangles and off by as much as they; infinite where some of it does not count.
+    fn surely(&self, _distance: f64) -> f64 {
+        f64::INFINITY
+    }
     /// Whether all of a quad does not count.
     fn ignores(&self, _corners: &[[DVec3; 2]; 2], _slack: f64) -> bool {
         false
@@ -55,6 +59,14 @@ pub(crate) struct FromPoint {
 impl Measure for FromPoint {
     fn triangle(&self, corners: [DVec3; 3], _: f64) -> Option<(f64, [f64; 2])> {
         Some(nearest(self.point, corners))
+    }
+
+    fn surely(&self, distance: f64) -> f64 {
+        if self.skip.is_none() {
+            distance
+        } else {
+            f64::INFINITY
+        }
     }
 
     fn ignores(&self, corners: &[[DVec3; 2]; 2], slack: f64) -> bool {
@@ -213,6 +225,11 @@ impl Cell {
             return;
         };
         if distance - slack >= *best || measure.ignores(&quad.corners, slack) {
+            return;
+        }
+        if any && !self.is_cut && measure.surely(distance + slack) < *best {
+            *found = Some(self.place([0, 1].map(|k| quad.from[k] + quad.size * at[k])));
+            *best = measure.surely(distance + slack);
             return;
         }
         let st = [quad.from[0] + quad.size * at[0], quad.from[1] + quad.size * at[1]];

@@ -32,7 +32,11 @@ pub struct Faces;
 impl FaceReader for Faces {
     fn surface(&self, wanted: &Face) -> Result<FaceSurface, FaceError> {
         let model = model_with(&wanted.path, wanted.number)?;
-        Ok(surface_of(wanted, &model.faces[wanted.number - 1])?.1)
+        let made = surface_of(wanted, &model)?;
+        Ok(FaceSurface {
+            surface: made.spec(),
+            trimmed: made.trimmed.is_some(),
+        })
     }
 
     fn region(&self, job: &Job) -> Result<FaceRegion, FaceError> {
@@ -205,7 +209,7 @@ impl Asked {
             untrimmed: source.untrimmed,
             around_mm: source.around_mm,
         };
-        let (surface, _) = surface_of(&wanted, &model.faces[source.face - 1])?;
+        let surface = surface_of(&wanted, &model)?;
         let oracle = Oracle::new(job).map_err(|error| FaceError {
             what: error.to_string(),
             remedy: "give side = \"+\" or \"-\" in [cut]".to_owned(),
@@ -219,7 +223,7 @@ impl Asked {
         let whole = vec![vec![[u0, v0], [u1, v0], [u1, v1], [u0, v1]]];
         Ok(Self {
             face: source.face - 1,
-            trimmed: surface.trimmed.unwrap_or(whole),
+            trimmed: surface.trimmed.clone().unwrap_or(whole),
             placement: placement(job),
             tool: Tool::of(job),
             scallop_mm: job.scallop_mm,

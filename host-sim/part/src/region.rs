@@ -90,12 +90,7 @@ struct Border {
 }
 
 impl Border {
-    fn new(face: &Face, by: &Placement) -> Self {
-        let lines = polylines(face, EDGE_MM);
-        let edges: Vec<[DVec3; 2]> = lines
-            .iter()
-            .flat_map(|line| line.windows(2).map(|ends| [by.point(ends[0]), by.point(ends[1])]))
-            .collect();
+    fn new(edges: Vec<[DVec3; 2]>) -> Self {
         let blocks: Vec<Block> = edges.iter().map(|ends| Block::around(*ends)).collect();
         Self {
             tree: Tree::new(&blocks),
@@ -133,6 +128,19 @@ impl Request<'_> {
         }
     }
 
+    /// The edges of the face: those of the part, where it has them.
+    fn border(&self) -> Border {
+        if let Some((part, Some(own))) = self.part {
+            return Border::new(part.edges_of(own));
+        }
+        let lines = polylines(self.face, EDGE_MM);
+        let ends = lines.iter().flat_map(|line| line.windows(2));
+        Border::new(
+            ends.map(|ends| [0, 1].map(|k| self.placement.point(ends[k])))
+                .collect(),
+        )
+    }
+
     /// Largest derivatives and the largest step-over on the face, mm.
     fn looks(&self, rectangle: [[f64; 2]; 2]) -> ([f64; 2], f64) {
         let r = self.tool.radius;
@@ -161,7 +169,10 @@ impl Request<'_> {
     /// What can be reached, without a region: by `side` x `side` places around the face.
     #[must_use]
     pub fn reach(&self, side: usize) -> Made {
-        self.shares(&Inside::new(self.trimmed), &self.clearance(), side)
+        let clearance = self.clearance();
+        let places = self.places(&Inside::new(self.trimmed), side);
+        let checked: Vec<_> = places.iter().map(|(place, _)| clearance.check(*place)).collect();
+        shares(&places, &checked)
     }
 
     /// Makes the region.
@@ -174,7 +185,10 @@ impl Request<'_> {
         let grow_mm = if self.part.is_some() { GROWTH * step } else { 0.0 };
         let rectangle = self.rectangle(domain, metric, grow_mm);
         let clearance = self.clearance();
-        let mut made = self.shares(&trimmed, &clearance, SIDE);
+        let places = self.places(&trimmed, SIDE);
+        let checked: Vec<Result<(), Reason>> =
+            places.iter().map(|(place, _)| clearance.check(*place)).collect();
+        let mut made = shares(&places, &checked);
         if made.reachable_mm2 == 0.0
             && made.area_mm2 > 0.0
             && made.unreachable_mm2.iter().all(|(why, _)| *why == Reason::Steep)
@@ -182,7 +196,7 @@ impl Request<'_> {
             return made;
         }
         made.radius_mm = self.largest_ball(&trimmed, &made);
-        let border = Border::new(self.face, self.placement);
+        let border = self.border();
         let poles = self.poles(domain);
         let beside_pole = |point: DVec3| poles.iter().any(|pole| pole.distance(point) < POLE_STEPS * step);
         let holds = |place: [f64; 2]| {
@@ -205,9 +219,11 @@ impl Request<'_> {
             simplify_mm: SIMPLIFY_MM,
         });
         let inside = Inside::new(&made.loops);
-        made.inside_mm2 = self.sum(&trimmed, |place| {
-            inside.contains(place) && clearance.check(place).is_ok()
-        });
+        let reached = places.iter().zip(&checked).filter(|(_, checked)| checked.is_ok());
+        made.inside_mm2 = reached
+            .filter(|((place, _), _)| inside.contains(*place))
+            .map(|((_, area), _)| area)
+            .sum();
         made
     }
 
@@ -326,32 +342,23 @@ impl Request<'_> {
         }
         Some(low)
     }
+}
 
-    fn sum(&self, trimmed: &Inside, holds: impl Fn([f64; 2]) -> bool) -> f64 {
-        let places = self.places(trimmed, SIDE);
-        places
-            .iter()
-            .filter(|(place, _)| holds(*place))
-            .map(|(_, area)| area)
-            .sum()
-    }
-
-    /// What can be reached, and why not.
-    fn shares(&self, trimmed: &Inside, clearance: &Clearance<'_>, side: usize) -> Made {
-        let mut made = Made::default();
-        let mut lost = [0.0; Reason::ALL.len()];
-        for (place, area) in self.places(trimmed, side) {
-            made.area_mm2 += area;
-            match clearance.check(place) {
-                Ok(()) => made.reachable_mm2 += area,
-                Err(why) => lost[Reason::ALL.iter().position(|reason| *reason == why).unwrap_or(0)] += area,
-            }
+/// What can be reached of places, and why not.
+fn shares(places: &[([f64; 2], f64)], checked: &[Result<(), Reason>]) -> Made {
+    let mut made = Made::default();
+    let mut lost = [0.0; Reason::ALL.len()];
+    for ((_, area), checked) in places.iter().zip(checked) {
+        made.area_mm2 += area;
+        match checked {
+            Ok(()) => made.reachable_mm2 += area,
+            Err(why) => lost[Reason::ALL.iter().position(|reason| reason == why).unwrap_or(0)] += area,
         }
-        made.unreachable_mm2 = Reason::ALL
-            .into_iter()
-            .zip(lost)
-            .filter(|(_, area)| *area > 0.0)
-            .collect();
-        made
     }
+    made.unreachable_mm2 = Reason::ALL
+        .into_iter()
+        .zip(lost)
+        .filter(|(_, area)| *area > 0.0)
+        .collect();
+    made
 }

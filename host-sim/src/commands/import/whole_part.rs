@@ -16,7 +16,7 @@ use rayon::prelude::*;
 use super::super::out::say;
 use super::super::{Failure, Result, progress, whole};
 use super::Arguments;
-use cad::{CadError, Face, MachinableFace, Model, Options, machinable};
+use cad::{CadError, Face, MachinableFace, Model, Options, machinable_once};
 use face::{Asked, Outcome, outcome};
 use part::Tool;
 use picture::{cells, page};
@@ -99,9 +99,9 @@ pub(super) fn command(arguments: &Arguments, file: &str, model: &Arc<Model>, out
     let tool = Tool::new(radius_mm, &job::ToolBody::default());
     let wanted = |face: &&Face| arguments.faces.is_empty() || arguments.faces.contains(&face.number);
     let faces: Vec<&Face> = model.faces.iter().filter(wanted).collect();
-    let made: Vec<std::result::Result<MachinableFace, CadError>> = faces
+    let made: Vec<std::result::Result<Arc<MachinableFace>, CadError>> = faces
         .par_iter()
-        .map(|face| machinable(file, face, &options))
+        .map(|face| machinable_once(file, model, face.number, &options))
         .collect();
     let setup = match arguments.up {
         Up::Auto => best_side(model, &faces, &made, &tool, scallop_mm),
@@ -124,7 +124,7 @@ pub(super) fn command(arguments: &Arguments, file: &str, model: &Arc<Model>, out
     std::fs::create_dir_all(&folder).map_err(|error| super::super::cannot_write(&folder, &error))?;
     let bar = progress(faces.len() as u64, "regions");
     let each = faces.par_iter().zip(&made).map(|(face, made)| {
-        let mut found = outcome(arguments, file, face, made.as_ref(), &asked, &folder);
+        let mut found = outcome(arguments, file, face, made.as_deref(), &asked, &folder);
         if let (Ok(made), true) = (made, face.surface.kind() != "plane") {
             found.cells = cells(&asked, face, made, &found);
         }
@@ -159,7 +159,7 @@ pub(super) fn reaches(
     };
     let bar = progress(faces.len() as u64, "reach");
     let found = faces.par_iter().map(|face| {
-        let made = machinable(file, face, &options).ok();
+        let made = machinable_once(file, model, face.number, &options).ok();
         bar.inc(1);
         made.map(|made| asked.reach(face, &made, 64))
     });

@@ -111,7 +111,7 @@ impl Setup {
 pub(super) fn best_side(
     model: &Arc<Model>,
     faces: &[&Face],
-    made: &[std::result::Result<MachinableFace, CadError>],
+    made: &[std::result::Result<Arc<MachinableFace>, CadError>],
     tool: &Tool,
     scallop_mm: f64,
 ) -> Setup {
