@@ -318,17 +318,24 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     }
 }
 
-/// The jobs together: how many passed, and their time.
+/// The jobs together: how many passed, their time, and what they leave of a part.
 fn summary(values: &[Value]) {
     let passed = values.iter().filter(|value| value["passed"] == true).count();
-    let times = values
-        .iter()
-        .filter_map(|value| value["time_s"]["whole"].as_f64());
-    let time_s = times.fold(0.0, |sum, time_s| sum + time_s);
+    let sum =
+        |of: &dyn Fn(&Value) -> &Value| values.iter().filter_map(|value| of(value).as_f64()).sum::<f64>();
+    let left = |key: &str| sum(&|value| &value["part"]["left"][key]);
+    let [reachable_mm2, within_mm2] = ["reachable_mm2", "within_mm2"].map(left);
+    if reachable_mm2 > 0.0 {
+        say!(
+            "{:.3} % of {reachable_mm2:.3} mm2 within {} of the scallop limit",
+            100.0 * within_mm2 / reachable_mm2,
+            1.0 + part::LEFTOVER_SHARE
+        );
+    }
     say!(
         "{passed} of {} jobs passed, {:.2} min in all",
         values.len(),
-        time_s / 60.0
+        sum(&|value| &value["time_s"]["whole"]) / 60.0
     );
 }
 

@@ -1,38 +1,116 @@
-//! How long the passes of a face take along each parameter, about.
+//! The passes of a face along each parameter, about: how long they take, and what they leave where the region ends.
+//!
+//! Where nothing is in the way a region is larger than its face, so passes may end anywhere. Where something is, they end on its boundary: one that is slanted to them keeps
+//! a strip that is higher than the limit, between the ends of passes. Across the boundary nothing is left, so the direction decides.
 
 use job::{Along, Region};
 
-/// Most lines that are looked at for the direction of the passes, parts of an interval, and the time that each interval costs beside its length, s.
+/// Most lines that are looked at, parts of an interval, and the time that each interval costs beside its length, s.
 const LINES_MAX: usize = 4000;
 const PARTS: u32 = 8;
 const INTERVAL_S: f64 = 0.15;
+/// Shortest interval, in step-overs, as in jobs.
+const LEAST_STEPS: f64 = 0.1;
+/// What is left may be higher than the scallop limit by this share, as `verify` counts it.
+const HIGHER: f64 = 1.03;
+/// Lines on either side of a place that may serve it.
+const BESIDE: usize = 3;
+/// Share of the area that may be left for the faster direction.
+const LEFT_SHARE: f64 = 0.005;
 
-/// Time of the passes along a parameter about, s: their length at the feed, and some time for each.
-pub(super) fn effort_s(
-    surface: &oracle::Surface,
-    region: &Region,
-    along: Along,
-    step_over_mm: f64,
-    feed_mm_s: f64,
-) -> f64 {
-    let swapped = |[u, v]: [f64; 2]| match along {
+/// What the passes are made for.
+#[derive(Clone, Copy)]
+pub(super) struct Passes<'a> {
+    pub(super) surface: &'a oracle::Surface,
+    pub(super) region: &'a Region,
+    pub(super) step_over_mm: f64,
+    pub(super) feed_mm_s: f64,
+    /// Places of the face, each with its area.
+    pub(super) places: &'a [([f64; 2], f64)],
+}
+
+/// The passes along a parameter.
+pub(super) struct Effort {
+    pub(super) along: Along,
+    /// Their time, s.
+    pub(super) time_s: f64,
+    /// Share of the places that they leave too high.
+    pub(super) left: f64,
+}
+
+/// A line of constant side parameter, and its intervals.
+struct Line {
+    side: f64,
+    intervals: Vec<[f64; 2]>,
+}
+
+/// `[path, side]` of (u, v), and back.
+const fn swapped(along: Along, [u, v]: [f64; 2]) -> [f64; 2] {
+    match along {
         Along::U => [u, v],
         Along::V => [v, u],
-    };
-    // Lengths of the derivatives along the pass and across it.
-    let speeds = |path: f64, side: f64| {
-        let [u, v] = swapped([path, side]);
-        let at = surface.at(u, v);
-        swapped([at.u.length(), at.v.length()])
-    };
-    let edges: Vec<[[f64; 2]; 2]> = region.edges().map(|ends| ends.map(swapped)).collect();
-    let sides = || edges.iter().flatten().map(|end| end[1]);
-    let (low, high) = (
-        sides().fold(f64::INFINITY, f64::min),
-        sides().fold(f64::NEG_INFINITY, f64::max),
-    );
-    let (mut side, mut sum) = (low, 0.0);
-    for _ in 0..LINES_MAX {
+    }
+}
+
+impl Passes<'_> {
+    /// The direction that takes less time, of those that leave little; else the one that leaves less.
+    pub(super) fn best(&self) -> Effort {
+        let [u, v] = [Along::U, Along::V].map(|along| self.effort(along));
+        let leaves_little = [&u, &v].map(|effort| effort.left <= LEFT_SHARE);
+        let is_v = match leaves_little {
+            [true, true] => v.time_s < u.time_s,
+            [false, false] => v.left < u.left,
+            [_, is_v] => is_v,
+        };
+        if is_v { v } else { u }
+    }
+
+    /// Lengths of the derivatives along a pass and across it.
+    fn speeds(&self, along: Along, path: f64, side: f64) -> [f64; 2] {
+        let [u, v] = swapped(along, [path, side]);
+        let at = self.surface.at(u, v);
+        swapped(along, [at.u.length(), at.v.length()])
+    }
+
+    pub(super) fn effort(&self, along: Along) -> Effort {
+        let edges: Vec<[[f64; 2]; 2]> = self
+            .region
+            .edges()
+            .map(|ends| ends.map(|end| swapped(along, end)))
+            .collect();
+        let sides = || edges.iter().flatten().map(|end| end[1]);
+        let (low, high) = (
+            sides().fold(f64::INFINITY, f64::min),
+            sides().fold(f64::NEG_INFINITY, f64::max),
+        );
+        let least = (high - low) / LINES_MAX as f64;
+        let (mut lines, mut time_s) = (Vec::new(), 0.0);
+        let mut side = low;
+        // The last line is on the region's end.
+        let last = high - 1e-9 * (high - low);
+        for _ in 0..=LINES_MAX {
+            let (line, widest, line_s) = self.line(along, &edges, side);
+            time_s += line_s;
+            lines.push(line);
+            if side >= last {
+                break;
+            }
+            let step = if widest > 0.0 {
+                self.step_over_mm / widest
+            } else {
+                (high - low) / 100.0
+            };
+            side = (side + step.max(least)).min(last);
+        }
+        Effort {
+            along,
+            time_s,
+            left: self.left(along, &lines),
+        }
+    }
+
+    /// A line, the longest derivative across it, and its time.
+    fn line(&self, along: Along, edges: &[[[f64; 2]; 2]], side: f64) -> (Line, f64, f64) {
         let met = |ends: &&[[f64; 2]; 2]| (ends[0][1] <= side) != (ends[1][1] <= side);
         let mut crossings: Vec<f64> = edges
             .iter()
@@ -40,25 +118,85 @@ pub(super) fn effort_s(
             .map(|[a, b]| a[0] + (side - a[1]) / (b[1] - a[1]) * (b[0] - a[0]))
             .collect();
         crossings.sort_by(f64::total_cmp);
-        let mut widest = 0.0_f64;
+        let mut intervals = Vec::new();
+        let (mut widest, mut time_s) = (0.0_f64, 0.0);
         for [from, to] in crossings.as_chunks::<2>().0 {
+            let mut length_mm = 0.0;
             for part in 0..PARTS {
                 let share = (f64::from(part) + 0.5) / f64::from(PARTS);
-                let [speed, across] = speeds(from + share * (to - from), side);
-                sum += speed * (to - from) / f64::from(PARTS) / feed_mm_s;
+                let [speed, across] = self.speeds(along, from + share * (to - from), side);
+                length_mm += speed * (to - from) / f64::from(PARTS);
                 widest = widest.max(across);
             }
-            sum += INTERVAL_S;
+            if length_mm >= LEAST_STEPS * self.step_over_mm {
+                time_s += length_mm / self.feed_mm_s + INTERVAL_S;
+                intervals.push([*from, *to]);
+            }
         }
-        let step = if widest > 0.0 {
-            step_over_mm / widest
-        } else {
-            (high - low) / 100.0
-        };
-        side += step.max((high - low) / LINES_MAX as f64);
-        if side >= high {
-            break;
-        }
+        (Line { side, intervals }, widest, time_s)
     }
-    sum
+
+    /// Share of the places that are too far from every pass.
+    fn left(&self, along: Along, lines: &[Line]) -> f64 {
+        let within_mm = 0.5 * self.step_over_mm * HIGHER.sqrt();
+        let (mut all, mut left) = (0.0, 0.0);
+        for (place, area) in self.places {
+            let [path, side] = swapped(along, *place);
+            let [speed, across] = self.speeds(along, path, side);
+            let above = lines.partition_point(|line| line.side < side);
+            let near = &lines[above.saturating_sub(BESIDE)..(above + BESIDE).min(lines.len())];
+            let is_served = near.iter().any(|line| {
+                let beside_mm = (line.side - side) * across;
+                line.intervals.iter().any(|[from, to]| {
+                    let beyond_mm = (from - path).max(path - to).max(0.0) * speed;
+                    beside_mm.hypot(beyond_mm) <= within_mm
+                })
+            });
+            all += area;
+            if !is_served {
+                left += area;
+            }
+        }
+        if all > 0.0 { left / all } else { 0.0 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Passes;
+    use job::{Along, Region};
+
+    /// A plane of 20 mm x 10 mm whose region ends on a line that is slanted by 1 in 20 to u: passes along u take less time, but leave a strip there.
+    #[test]
+    fn passes_across_a_slanted_end_leave_nothing() {
+        let text = "[surface]\nkind = \"nurbs\"\ndegree = [1, 1]\nknots_u = [0, 0, 20, 20]\nknots_v = [0, 0, 10, 10]\n\
+            poles_mm = [[[0, 0, 0], [0, 10, 0]], [[20, 0, 0], [20, 10, 0]]]\n\
+            [tool]\nkind = \"ball\"\nradius_mm = 3\n[cut]\nfeed_mm_min = 1200\nscallop_mm = 0.01\nalong = \"u\"\nside = \"up\"\n";
+        let job = job_file::parse("plane.toml", text).unwrap();
+        let surface = oracle::Surface::new(&job.surface);
+        let region = Region::new(vec![vec![[0.0, 0.0], [20.0, 0.0], [20.0, 6.0], [0.0, 5.0]]]);
+        let places: Vec<([f64; 2], f64)> = (0..200)
+            .flat_map(|i| (0..200).map(move |j| [0.1 * (f64::from(i) + 0.5), 0.05 * (f64::from(j) + 0.5)]))
+            .filter(|[u, v]| *v < 5.0 + u / 20.0)
+            .map(|place| (place, 0.005))
+            .collect();
+        let passes = Passes {
+            surface: &surface,
+            region: &region,
+            step_over_mm: 0.5,
+            feed_mm_s: 20.0,
+            places: &places,
+        };
+        let [u, v] = [Along::U, Along::V].map(|along| passes.effort(along));
+        assert!(u.time_s < v.time_s, "{} {}", u.time_s, v.time_s);
+        assert!(u.left > 0.01 && v.left < 0.001, "{} {}", u.left, v.left);
+        assert_eq!(passes.best().along, Along::V);
+        // Without the slanted end nothing is left, and the faster one is taken.
+        let whole = Region::new(vec![vec![[0.0, 0.0], [20.0, 0.0], [20.0, 6.5], [0.0, 6.5]]]);
+        let passes = Passes {
+            region: &whole,
+            ..passes
+        };
+        assert_eq!(passes.best().along, Along::U);
+    }
 }

@@ -4,11 +4,15 @@ use std::path::{Path, PathBuf};
 
 use cad::{CadError, Face, JobOptions, MachinableFace, Placement, write_job};
 use job::{Along, FaceReach, Region, SurfaceSpec};
-use part::{Part, Request, Tool};
+use part::{Inside, Part, Request, Tool};
 
 use super::super::{Arguments, relative};
-use super::effort::effort_s;
+use super::effort::Passes;
 use super::setup::Setup;
+
+/// Places a side at which it is asked whether anything of a face is reached, and how much.
+const LOOK_SIDE: usize = 12;
+const REACH_SIDE: usize = 64;
 
 /// What becomes of a face.
 pub(super) struct Outcome {
@@ -125,12 +129,15 @@ pub(super) fn outcome(
             return outcome;
         }
     };
-    let reach = asked.reach(face, made, 64);
-    if reach.reachable_mm2 == 0.0 {
+    // Where a few places tell that something is reached, the region tells how much.
+    if asked.reach(face, made, LOOK_SIDE).reachable_mm2 == 0.0 {
+        let reach = asked.reach(face, made, REACH_SIDE);
+        let is_reached = reach.reachable_mm2 > 0.0;
         outcome.reach = Some(reach);
-        return outcome;
+        if !is_reached {
+            return outcome;
+        }
     }
-    outcome.reach = Some(reach);
     // In the folder: paths are relative to it, and the region is kept there.
     let path = folder.join("face.toml");
     let written = write_job(
@@ -174,10 +181,28 @@ pub(super) fn outcome(
                     .map(|[u, v]| surface.at(*u, *v).point.z);
                 outcome.top_mm = heights.fold(f64::NEG_INFINITY, f64::max);
                 let step_over_mm = (8.0 * job.radius_mm * job.scallop_mm).sqrt();
-                let efforts = [Along::U, Along::V]
-                    .map(|along| effort_s(&surface, &region, along, step_over_mm, job.feed_mm_min / 60.0));
-                outcome.along = if efforts[1] < efforts[0] { "v" } else { "u" };
-                outcome.passes_s = efforts[0].min(efforts[1]);
+                let inside = Inside::new(&region.loops);
+                let mut places = asked.of(face, made, |request| {
+                    request.places(&Inside::new(request.trimmed), REACH_SIDE)
+                });
+                places.retain(|(place, _)| inside.contains(*place));
+                let passes = Passes {
+                    surface: &surface,
+                    region: &region,
+                    step_over_mm,
+                    feed_mm_s: job.feed_mm_min / 60.0,
+                    places: &places,
+                };
+                let best = match arguments.along.as_deref() {
+                    Some("u") => passes.effort(Along::U),
+                    Some("v") => passes.effort(Along::V),
+                    _ => passes.best(),
+                };
+                outcome.along = match best.along {
+                    Along::U => "u",
+                    Along::V => "v",
+                };
+                outcome.passes_s = best.time_s;
                 outcome.region = Some((region, job.surface));
                 outcome.text = match &arguments.along {
                     Some(_) => text,
