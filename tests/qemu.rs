@@ -156,6 +156,14 @@ fn region() {
     ]);
 }
 
+/// A job that is larger than the board's store, after one that is not: its rows are sent while it runs.
+#[test]
+fn streamed_rows() {
+    let streamed = job("streamed");
+    assert!(streamed.header.window > 0);
+    compare_prepared(&[("torus", job("torus")), ("streamed", streamed)]);
+}
+
 /// A job with axis limits, before and after one without.
 #[test]
 fn with_limits() {

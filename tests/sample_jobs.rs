@@ -69,6 +69,7 @@ jobs! {
     ruled_printed: 132,
     ruled_reconstructed: 132,
     sphere_cap: 85,
+    streamed: 142,
     torus: 24,
 }
 
