@@ -167,7 +167,7 @@ fn streamed_rows() {
 /// A job with axis limits, before and after one without.
 #[test]
 fn with_limits() {
-    compare(&["plate_machine", "torus", "plate_machine"]);
+    compare(&["plate_machine", "torus", "fan", "plate_machine"]);
 }
 
 /// The board's job differs in one coefficient, by 40 of its units: the report names the pass and the tick of the first

@@ -2,6 +2,7 @@
 //! surfaces with what makes the step to the next pass difficult: short passes at high feed, many patches.
 
 mod constant;
+mod lengths;
 pub(crate) mod shapes;
 
 use std::path::PathBuf;

@@ -21,7 +21,7 @@ use crate::pass::route::Route;
 use crate::pass::schedule;
 use crate::sample::{Sample, SpanParameter, interval_of};
 use crate::surface::{AnyCurve, AnyPass, PathSpeed};
-use next_pass::PassPlanning;
+use next_pass::{BEGINS_ANYWHERE, PassPlanning};
 use travel::{Next, Travel};
 
 /// Patch boundaries that one period's arc may cross. One is enough where every patch is longer than the arc; a second
@@ -175,7 +175,9 @@ impl Run {
     /// # Errors
     /// As [`Self::advance`].
     pub(crate) fn enter_pass(&mut self, job: &Job<'_>, pass: u32, route: Route) -> Result<()> {
-        if pass > 0 && job.header.pattern == Pattern::Zig {
+        if job.header.spacing.is_constant() {
+            self.travel.offset = BEGINS_ANYWHERE;
+        } else if pass > 0 && job.header.pattern == Pattern::Zig {
             self.travel.offset = self.first_offset;
         }
         self.travel.pass = pass;

@@ -12,6 +12,9 @@ use crate::pass::scan::PassScan;
 use crate::pass::step_over::{PassMaximum, StepOverEstimator};
 use crate::sample::SpanParameter;
 
+/// The offset before the first sample of a pass on a front, which may begin far from both ends of the last one: no normal folds against it.
+pub(super) const BEGINS_ANYWHERE: [i32; 3] = [0; 3];
+
 /// What is planned while the tool is on a pass, by the job's spacing.
 #[derive(Clone, Copy, Debug)]
 #[allow(clippy::large_enum_variant, reason = "one lives in the interpolator for ever")]
@@ -81,6 +84,7 @@ impl Run {
             if let NextRoute::Pass(_) = next {
                 fronts.arrive();
                 self.travel.pass = self.travel.pass.wrapping_add(1);
+                self.travel.offset = BEGINS_ANYWHERE;
             }
             return Ok(next);
         }
