@@ -404,7 +404,7 @@ fn the_image_is_bounded() {
     );
     assert_eq!(analysis.stale(), [""; 0], "bounds without a loop");
     assert_eq!(analysis.panics(), [""; 0], "in a real-time task");
-    for name in ["Sequencer::tick", "planning::plan", "Lookahead::work"] {
+    for name in ["Sequencer::tick", "Sequencer>::plan", "Lookahead::work"] {
         assert!(
             analysis.task.iter().any(|function| function.ends_with(name)),
             "{name} is not followed"

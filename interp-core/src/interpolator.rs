@@ -497,8 +497,10 @@ impl Motion {
             sequencer.plan(program, store, run);
             return;
         }
+        // A piece of a front is read from the words behind the job's.
+        let spent = program.job(store).map_or(0, |job| run.prepare_piece(&job));
         if let Ok((job, rest)) = program.job_and_rest(store) {
-            run.plan(&job, rest);
+            run.plan(&job, rest, spent);
         }
         if let Ok(job) = program.job(store) {
             run.prepare_front(&job);

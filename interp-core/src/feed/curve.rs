@@ -69,16 +69,20 @@ impl Piece {
 
     /// The same where the phase is known: at its ends rounding could make it another.
     fn rates_in(&self, phase: Phase, t: f32) -> [f32; 3] {
+        if let Phase::Cruise = phase {
+            return [self.to, 0.0, 0.0];
+        }
         // The acceleration rises to its peak, stays, and falls.
         let peak = (self.to - self.from) / (self.ramp_s - self.jerk_s);
-        let jerk = peak / self.jerk_s;
-        let left = self.ramp_s - t;
-        match phase {
-            Phase::Begin => [self.from + 0.5 * jerk * t * t, jerk * t, jerk],
-            Phase::Steady => [self.from + peak * (t - 0.5 * self.jerk_s), peak, 0.0],
-            Phase::End => [self.to - 0.5 * jerk * left * left, jerk * left, -jerk],
-            Phase::Cruise => [self.to, 0.0, 0.0],
+        if let Phase::Steady = phase {
+            return [self.from + peak * (t - 0.5 * self.jerk_s), peak, 0.0];
         }
+        let jerk = peak / self.jerk_s;
+        if let Phase::Begin = phase {
+            return [self.from + 0.5 * jerk * t * t, jerk * t, jerk];
+        }
+        let left = self.ramp_s - t;
+        [self.to - 0.5 * jerk * left * left, jerk * left, -jerk]
     }
 
     /// Length between two times of the ramp, mm: by each phase's own rates, so that no long lengths are subtracted.

@@ -52,8 +52,8 @@ const TURN_JERK: f32 = 0.88;
 /// Use of the jerk that the check passes: a plan with more is slowed down.
 const JERK_CHECKED: f32 = 0.998;
 
-/// Cycles of the pieces of work in a period's planning, by the pessimistic model of `cargo sim budget`; with the rest of the task 30 000.
-pub(crate) const PORTION_CYCLES: u32 = 26_500;
+/// Cycles of the pieces of work in a period's planning, of which the first may take more, by the pessimistic model of `cargo sim budget`.
+pub(crate) const PORTION_CYCLES: u32 = 24_000;
 
 /// Cycles of one piece of work, by the same model.
 mod cycles {

@@ -1,8 +1,7 @@
 //! Double buffer of patches: the run's current patch, and the next one along the pass.
 //!
 //! A tick that crosses a boundary needs the next piece of the pass, its patch collapsed, and the parametrisation at the boundary on both sides. None of them
-//! depends on the exact end of the previous tick, so all are prepared ahead, in ticks with little other work: one
-//! [`Task`] per tick. A tick that reaches a boundary sooner executes the missing tasks itself.
+//! depends on the exact end of the previous tick, so all are prepared ahead, in the planning: one [`Task`] per period. A tick that reaches a boundary sooner executes the missing tasks itself.
 //!
 //! At a station of a front the patch stays the same: the next piece is another curve on it ([`Ahead::Station`]).
 
@@ -11,9 +10,14 @@ use crate::job::program::Job;
 use crate::pass::patch::{OnFront, Patch};
 use crate::pass::route::{Piece, Route};
 
+/// Cycles of a task, by the pessimistic model of `cargo sim budget`.
+pub(crate) const CYCLES: u32 = 3_500;
+
 /// The next task, in this order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Task {
+    /// Find the change of the parametrisation over the first period of the pass.
+    First,
     /// Find the next piece of the pass.
     Next,
     /// Collapse its patch, or make its curve.
@@ -22,7 +26,7 @@ enum Task {
     Jump,
     /// Find the parametrisation at its start.
     Start,
-    /// Find its change over the first period, on a front.
+    /// Find its change over the first period.
     Change,
     /// Find the parametrisation at the end of the current patch.
     End,
@@ -132,7 +136,7 @@ impl PatchBuffer {
         (piece, is_prepared): (&Piece, bool),
     ) -> Result<()> {
         self.prepared = None;
-        self.restart_tasks();
+        (self.task, self.ahead) = (Task::First, Ahead::Unknown);
         if is_prepared {
             self.second = !self.second;
             return Ok(());
@@ -198,6 +202,10 @@ impl PatchBuffer {
     #[inline(never)]
     pub(crate) fn work(&mut self, job: &Job<'_>, route: &Route, piece: &Piece) {
         self.task = match self.task {
+            Task::First => {
+                self.both().0.find_change();
+                Task::Next
+            }
             Task::Next => {
                 self.find_next(job, route, piece);
                 match self.ahead {
@@ -221,11 +229,7 @@ impl PatchBuffer {
             }
             Task::Start => {
                 self.both().1.find_start();
-                if route.is_on_front() {
-                    Task::Change
-                } else {
-                    Task::End
-                }
+                Task::Change
             }
             Task::Change => {
                 self.both().1.find_change();

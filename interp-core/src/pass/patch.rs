@@ -266,6 +266,9 @@ impl Patch {
 
     /// Computes the change of the parametrisation over the first period, and stores it for [`Self::change`].
     pub(crate) fn find_change(&mut self) {
+        if self.point {
+            return;
+        }
         let ([start, end], speed) = (self.range, self.start());
         let step = self.arc * speed.inv_speed;
         // The curve ends with the piece.

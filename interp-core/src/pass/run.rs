@@ -14,7 +14,7 @@ use crate::fault::{Fault, FaultKind, Result};
 use crate::job::Pattern;
 use crate::job::program::{Job, Program};
 use crate::math::arith::{advanced, fraction_from_f32, fraction_to_f32};
-use crate::pass::buffer::PatchBuffer;
+use crate::pass::buffer::{self, PatchBuffer};
 use crate::pass::contact::{self, Reach};
 use crate::pass::lines::{NextPass, RegionLines};
 use crate::pass::route::Route;
@@ -120,9 +120,6 @@ impl Run {
                 && self.moves(job, step)?
             {
                 self.sample(last)?;
-                if self.buffer.has_work() {
-                    self.buffer.work(job, &self.travel.route, &self.travel.piece);
-                }
                 return Ok(true);
             }
         }
@@ -235,9 +232,6 @@ impl Run {
         {
             self.sample(last)?;
             last.feed_mm_s = job.header.feed_mm_s * feed_factor;
-            if self.buffer.has_work() {
-                self.buffer.work(job, &self.travel.route, &self.travel.piece);
-            }
             return Ok(());
         }
         let interval = self.last_interval;
@@ -308,9 +302,18 @@ impl Run {
         last.inv_interval_sq = 0.0;
     }
 
-    /// Whether the patch after this one is being prepared: an item a tick.
-    pub(crate) fn prepares_patch(&self) -> bool {
-        self.buffer.has_work()
+    /// Whether anything is left to prepare of the next piece of the pass.
+    pub(crate) fn has_to_prepare(&self) -> bool {
+        self.is_along() && self.buffer.has_work()
+    }
+
+    /// Prepares an item of the next piece of the pass, in the planning of a period. Returns its cycles.
+    pub(crate) fn prepare_piece(&mut self, job: &Job<'_>) -> u32 {
+        if !self.has_to_prepare() {
+            return 0;
+        }
+        self.buffer.work(job, &self.travel.route, &self.travel.piece);
+        buffer::CYCLES
     }
 
     /// Writes the fields of a sample that change only with the pass.
@@ -397,6 +400,9 @@ impl Run {
     fn step_far(&mut self, job: &Job<'_>, feed_factor: f32) -> Result<()> {
         let mut rest = feed_factor * job.header.feed_mm_s * job.header.period_s;
         let mut start = self.travel.path;
+        if self.travel.is_at_start() && self.continues(&start, rest, feed_factor) {
+            return Ok(());
+        }
         let most = if self.travel.route.front.is_some() {
             CROSSINGS_ON_FRONT_MAX
         } else {
@@ -434,7 +440,7 @@ impl Run {
         Err(Fault::new(FaultKind::PatchTooShort, rest))
     }
 
-    /// Moves by the rest of a period's arc, mm, by the series from the start of a patch on a front, where the change of the parametrisation there is known: without
+    /// Moves by the rest of a period's arc, mm, by the series from the start of a piece, where the change of the parametrisation there is known: without
     /// an evaluation. Returns whether it holds.
     fn continues(&mut self, start: &PathSpeed, rest: f32, feed_factor: f32) -> bool {
         let Self { travel, buffer, .. } = self;

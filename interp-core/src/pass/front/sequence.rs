@@ -13,7 +13,7 @@ use crate::pass::route::Route;
 use crate::sample::SpanParameter;
 
 /// Cycles of the planning in a period of 1 ms, a share of the period; never less than one portion, nor more than in 1 ms.
-const PORTION_CYCLES: f32 = 25_000.0;
+const PORTION_CYCLES: f32 = 23_500.0;
 const PORTION_PERIOD_S: f32 = 1e-3;
 /// Most portions of a period.
 const PORTIONS_MAX: u8 = 8;
@@ -144,13 +144,13 @@ impl FrontSequence {
         matches!(self.line, Line::Front) && !self.is_last_part && self.part_search.is_found()
     }
 
-    /// The planning of one period of a job without limits.
+    /// The planning of one period of a job without limits, of which some cycles are spent already.
     #[inline(never)]
-    pub(crate) fn plan(&mut self, job: &Job<'_>, words: &mut [i32]) {
+    pub(crate) fn plan(&mut self, job: &Job<'_>, words: &mut [i32], spent: u32) {
         let share = (job.header.period_s / PORTION_PERIOD_S).at_most(1.0);
-        let mut left = share * PORTION_CYCLES;
+        let real = |cycles: u32| f32::from(u16::try_from(cycles).unwrap_or(u16::MAX));
+        let mut left = share * PORTION_CYCLES - real(spent);
         for portion in 0..PORTIONS_MAX {
-            let real = |cycles: u32| f32::from(u16::try_from(cycles).unwrap_or(u16::MAX));
             let most = real(self.cycles());
             if most == 0.0 || (most > left && portion > 0) {
                 return;

@@ -117,6 +117,10 @@ impl Run {
 
     /// Whether [`Self::plan`] has anything to do.
     pub(crate) fn has_to_plan(&self, spacing: Spacing) -> bool {
+        self.has_to_prepare() || self.has_to_plan_pass(spacing)
+    }
+
+    fn has_to_plan_pass(&self, spacing: Spacing) -> bool {
         match &self.planning {
             PassPlanning::Fronts(fronts) => fronts.has_work() || self.is_front_due(),
             PassPlanning::Scan(scan) => {
@@ -138,10 +142,11 @@ impl Run {
         self.travel.next == Next::Over && self.step_over.is_none()
     }
 
-    /// The planning of one period without axis limits: scans the pass for the step to the next one, or makes the next front in the words behind the job's.
-    pub(crate) fn plan(&mut self, job: &Job<'_>, rest: &mut [i32]) {
+    /// The planning of one period without axis limits, of which some cycles are spent already: scans the pass for the step to the next one, or makes the next
+    /// front in the words behind the job's.
+    pub(crate) fn plan(&mut self, job: &Job<'_>, rest: &mut [i32], spent: u32) {
         let has_work = match &mut self.planning {
-            PassPlanning::Fronts(fronts) => return fronts.plan(job, rest),
+            PassPlanning::Fronts(fronts) => return fronts.plan(job, rest, spent),
             PassPlanning::Scan(scan) => {
                 scan.plan(job);
                 scan.has_work()

@@ -74,6 +74,11 @@ impl Travel {
         self.piece.position.span
     }
 
+    /// Whether the last sample was the first one of the pass.
+    pub(super) fn is_at_start(&self) -> bool {
+        self.fraction == self.piece.start() && self.log_speed_derivative_before.is_nan()
+    }
+
     /// The place a step beyond, if it is on the piece.
     #[inline(always)]
     pub(super) fn beyond(&self, step: u64) -> Option<u64> {

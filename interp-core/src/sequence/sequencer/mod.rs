@@ -25,7 +25,6 @@ use crate::sequence::legs::{Goal, Leg, LegPlanning};
 use crate::sequence::link::{BoundaryStepOver, StraightMove, check_faces_up};
 use crate::sequence::lookahead::{Lookahead, PassPlan};
 use crate::sequence::pause::Return;
-use on_pass::Correction;
 
 /// Phase of the sequence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -137,7 +136,8 @@ pub(crate) struct Sequencer {
     has_first_patch: bool,
     /// Patch of the pass and cell of the patch that the tool is in.
     cell: [u16; 2],
-    correction: Option<Correction>,
+    /// How far the tool is ahead of the progress, units of 2^-10 nm, where that was measured in the last period.
+    correction: Option<i64>,
     /// Whether the rows of patches are there that the planning of the pass after the next needs.
     has_rows: bool,
     /// Where a pause leads back to.

@@ -14,20 +14,10 @@ use crate::sequence::legs::{Goal, Leg};
 use crate::sequence::link::check_faces_up;
 use crate::sequence::turning::Part;
 
-/// Periods by which a correction of the progress waits for a cheaper tick, at most.
-const WAITS_MAX: u8 = 4;
-
 /// Arc before the end of a pass on a front from which on the progress is corrected in each period, units of 2^-10 nm, and the part of the difference that is taken
 /// in a period: a twelfth of 0.15 um takes 3 % of the jerk limit.
 const END_Q10: i64 = 300_000 << 10;
 const END_PARTS: i64 = 12;
-
-/// A correction of the progress: how far the tool is ahead of it, units of 2^-10 nm, and for how many periods that has been known.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Correction {
-    pub(super) apart_q10: i64,
-    pub(super) waited: u8,
-}
 
 impl Sequencer {
     /// Enters the pass, which begins at the tool's position, and emits its first sample.
@@ -196,8 +186,8 @@ impl Sequencer {
         self.pending.is_some() || (self.has_step_over && self.is_planned()) || !now.faces_up[1]
     }
 
-    /// Corrects the progress at each station by the plan's arc, so that errors do not accumulate from station to station: some periods after it was
-    /// measured, because those in which the tool comes to a patch, and the patch after it is prepared, are the worst-case ticks.
+    /// Corrects the progress at each station by the plan's arc, so that errors do not accumulate from station to station: in the period after it was
+    /// measured.
     fn correct_progress(&mut self, run: &Run) {
         let (now, _) = both(&mut self.plans, self.second);
         if self.phase != Phase::Pass || now.point {
@@ -208,10 +198,8 @@ impl Sequencer {
         }
         let (now, _) = both(&mut self.plans, self.second);
         let kept = now.kept_cells();
-        if let Some(correction) = &mut self.correction {
-            if run.prepares_patch() && correction.waited < WAITS_MAX {
-                correction.waited += 1;
-            } else if self.follower.correct(&now.plan, correction.apart_q10) {
+        if let Some(apart_q10) = self.correction {
+            if self.follower.correct(&now.plan, apart_q10) {
                 self.correction = None;
             }
             return;
@@ -228,10 +216,7 @@ impl Sequencer {
             return;
         };
         let arc_q10 = start_q10 + crate::feed::to_q10(since_mm);
-        self.correction = Some(Correction {
-            apart_q10: arc_q10 - self.follower.arc_q10(),
-            waited: 0,
-        });
+        self.correction = Some(arc_q10 - self.follower.arc_q10());
     }
 
     /// Corrects the progress by the arc left, near the end of a pass on a front: the stations are far apart there, and what is left of their error would be in the

@@ -72,6 +72,7 @@ impl Sequencer {
         };
         let wants_more = matches!(self.phase, Phase::Pass | Phase::Turn) && self.feed_factor > 1.0;
         is_busy
+            || run.has_to_prepare()
             || wants_more
             || self.pass_ahead().is_some()
             || (self.pending.is_none()
@@ -99,7 +100,8 @@ impl Sequencer {
         let Some(axes) = &program.header().axes else {
             return;
         };
-        let mut left = PORTION_CYCLES;
+        let spent = program.job(store).map_or(0, |job| run.prepare_piece(&job));
+        let mut left = PORTION_CYCLES - spent.min(PORTION_CYCLES);
         if matches!(self.phase, Phase::Pass | Phase::Turn) && self.feed_factor > 1.0 {
             let most = program
                 .job(store)
@@ -125,13 +127,9 @@ impl Sequencer {
             Planning::Awaited(_) => {}
         }
         let mut makes_front = false;
-        for _ in 0..PIECES_MAX {
+        for piece in 0..PIECES_MAX {
             let (is_front, cycles) = self.next_cycles(run);
-            debug_assert!(
-                cycles <= PORTION_CYCLES,
-                "a piece of {cycles} cycles never has its turn"
-            );
-            if cycles == 0 || cycles > left {
+            if cycles == 0 || (cycles > left && piece > 0) {
                 break;
             }
             if is_front {
@@ -141,7 +139,7 @@ impl Sequencer {
                 }
                 continue;
             }
-            left -= cycles;
+            left = left.saturating_sub(cycles);
             if let Ok(job) = program.job(store) {
                 self.work(&job, axes, run);
             }
