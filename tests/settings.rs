@@ -144,6 +144,23 @@ fn a_profile_is_in_force_at_once_and_after_a_power_cut() {
     }
 }
 
+#[test]
+fn another_scale_loses_the_position_and_other_limits_keep_it() {
+    let mut desk = Desk::new(Board::new());
+    let mut changed = profile();
+    desk.ask(&Request::SetProfile(Some(changed))).unwrap();
+    desk.ask(&Request::Drives { on: true }).unwrap();
+    desk.ask(&Request::SetHome { home_nm: [0; 3] }).unwrap();
+    changed.velocity_mm_s[0] *= 0.5;
+    desk.ask(&Request::SetProfile(Some(changed))).unwrap();
+    assert!(desk.status().safety.homed);
+    let mut steps = StepConfig::from(changed.steps);
+    steps.axes[2].inverted ^= true;
+    changed.steps = steps.into();
+    desk.ask(&Request::SetProfile(Some(changed))).unwrap();
+    assert!(!desk.status().safety.homed && desk.status().safety.drives_on);
+}
+
 /// More changes than both sectors hold, with a power cut now and then.
 #[test]
 fn a_profile_can_be_changed_for_ever() {
@@ -214,6 +231,7 @@ fn steps_and_homing_are_the_machines() {
 #[test]
 fn a_job_is_loaded_again_after_a_change_of_the_profile() {
     let mut desk = Desk::new(Board::new());
+    desk.ask(&Request::SetProfile(Some(profile()))).unwrap();
     desk.load(limited()).unwrap();
     desk.ask(&Request::Drives { on: true }).unwrap();
     let home_nm = [0, 0, 50_000_000];

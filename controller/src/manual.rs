@@ -148,6 +148,15 @@ impl Manual {
         self.status.at_nm
     }
 
+    /// Whether the position of homed axes stays valid under this profile.
+    pub(crate) fn keeps_position(&self, setup: Option<&Setup>) -> bool {
+        let is_same = match (&self.setup, setup) {
+            (Some(now), Some(next)) => next.has_coordinates_of(now),
+            (now, next) => now.is_none() && next.is_none(),
+        };
+        is_same || self.status.homed_axes == 0
+    }
+
     pub(crate) const fn set_up(&mut self, setup: Option<Setup>) {
         self.setup = setup;
     }

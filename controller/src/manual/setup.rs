@@ -8,6 +8,8 @@ use protocol::message::{AtSpeed, DoorContact, Homing, InputLines, Profile, Reaso
 pub struct Setup {
     limits: LineLimits,
     travel_nm: Option<[[i32; 2]; 3]>,
+    /// Digest of the settings of the drives.
+    steps: u32,
     homing: Option<Homing>,
     /// Inputs whose level means the opposite, and inputs that are not read.
     inverted: InputLines,
@@ -38,6 +40,7 @@ impl Setup {
                 period_s,
             },
             travel_nm: profile.travel_nm,
+            steps: profile.steps.digest(),
             homing: profile.homing,
             inverted,
             ignored,
@@ -45,6 +48,11 @@ impl Setup {
             step_inverted: profile.step_inverted,
             enable_inverted: profile.enable_inverted,
         }
+    }
+
+    /// Whether a position stays the same under another profile: drives and homing are those of this one.
+    pub(crate) fn has_coordinates_of(&self, other: &Self) -> bool {
+        self.steps == other.steps && self.homing == other.homing
     }
 
     /// Axes whose step pulses have the level opposite to the one in the board's table, one bit each.

@@ -43,6 +43,10 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
             }
             Order::Move(motion) => self.begin_motion(motion)?,
             Order::SetUp(setup) => {
+                if !self.control.manual.keeps_position(setup.as_ref()) {
+                    self.control.safety.set_homed(None);
+                    self.lose_position();
+                }
                 self.control.safety.set_up(setup.as_ref());
                 self.control
                     .spindle
