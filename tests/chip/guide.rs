@@ -195,6 +195,7 @@ fn hold(running: &mut Running, key: &str) {
         "right" => b"\x1b[C",
         "up" => b"\x1b[A",
         "page-up" => b"\x1b[5~",
+        "ctrl-c" => b"\x03",
         letter => letter.as_bytes(),
     };
     let until = Instant::now() + Duration::from_millis(ms.parse().unwrap());

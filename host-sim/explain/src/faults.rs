@@ -145,21 +145,21 @@ fn words(kind: FaultKind) -> [&'static str; 5] {
             "The emergency stop is pressed, or was pressed and has not been acknowledged. The drives were disabled in that tick, so the tool stopped without control, and the home position is lost.",
             "1, the input's bit.",
             "The button was pressed, or its wire is broken: boards read an open circuit as pressed.",
-            "Make the machine safe and release the button. Then `cargo sim operate --port DEV acknowledge`, place the axes, and `home X,Y,Z`.",
+            "Make the machine safe and release the button. Then `cargo sim operate --port DEV acknowledge`, `on`, and `home`; a machine without switches: place the axes, and `home X,Y,Z`.",
             "The button, pressed while a job runs.",
         ],
         FaultKind::LimitSwitch => [
             "An axis reached the end of its travel. The tool decelerated along its path; the position remains valid.",
             "The limit switches, as bits: x- 2, x+ 4, y- 8, y+ 16, z- 32, z+ 64.",
             "The job does not fit the travel from the declared home position, or a switch or its wire is defective.",
-            "Switch the drives off (`cargo sim operate --port DEV off`), move the axis off its switch by hand, switch the drives on, and declare home again. Compare `machine.travel_mm` with the machine.",
+            "Jog the axis off its switch, from x- by `cargo sim operate --port DEV jog x+2`. A board without a machine profile: `off`, move the axis by hand, `on`, and declare home again. Compare `machine.travel_mm` with the machine.",
             "Home declared at the wrong end of x.",
         ],
         FaultKind::DriveFault => [
             "A drive reports a fault, or reported one that has not been acknowledged. All drives were disabled in that tick, and the home position is lost.",
             "The drive faults, as bits: x 128, y 256, z 512, one for all 1024.",
             "Overload, overtemperature, undervoltage, or a motor's wire; see the drive's own display.",
-            "Find the cause at the drive. Then `cargo sim operate --port DEV acknowledge`, place the axes, and `home X,Y,Z`.",
+            "Find the cause at the drive. Then `cargo sim operate --port DEV acknowledge`, `on`, and `home`; a machine without switches: place the axes, and `home X,Y,Z`.",
             "A servo drive whose following error is too large.",
         ],
         FaultKind::LinkTimeout => [
@@ -173,7 +173,7 @@ fn words(kind: FaultKind) -> [&'static str; 5] {
             "The machine is not homed: the position of its axes is unknown, so no run starts.",
             "0.",
             "Home has not been declared since power-up, since the drives were off, or since an emergency stop or a drive fault.",
-            "Position the axes and declare their position in mm: `cargo sim run JOB --port DEV --home X,Y,Z`. For a board without axes: `homing_required = false` in [machine].",
+            "`cargo sim operate --port DEV on`, then `home`; a machine without switches: position the axes and declare where they stand, in mm: `home X,Y,Z`, or `cargo sim run JOB --port DEV --home X,Y,Z`. For a board without axes: `homing_required = false` in [machine].",
             "`cargo sim run JOB --port DEV` right after power-up.",
         ],
         FaultKind::SpindleSpeed => [

@@ -145,7 +145,7 @@ pub fn fault(fault: Fault) -> (String, &'static str) {
         ),
         FaultKind::WrongState => (
             "the machine's state does not allow this".to_owned(),
-            "abort the run first",
+            "`operate status` tells the state; docs/operating.md, which command it allows",
         ),
         FaultKind::DeadlineMissed => (
             format!("{value} deadlines of the sample timer were missed"),
@@ -169,18 +169,18 @@ pub fn fault(fault: Fault) -> (String, &'static str) {
         ),
         FaultKind::EmergencyStop => (
             "the emergency stop was pressed: the drives are off, the home position is lost".to_owned(),
-            "release the button, acknowledge, and declare home again (`cargo sim operate`)",
+            "release the button; then `operate acknowledge`, `on`, and `home`",
         ),
         FaultKind::LimitSwitch => (
             inputs("an axis is at the end of its travel", fault),
-            "move the axis off its switch by hand with the drives off, and declare home again (`cargo sim operate`)",
+            "jog the axis off its switch, from x- by `operate jog x+2`; without a machine profile: `off`, move it by hand, `on`, and declare home again",
         ),
         FaultKind::DriveFault => (
             inputs(
                 "the drives are off and the home position is lost because of",
                 fault,
             ),
-            "find the cause at the drive, acknowledge, and declare home again (`cargo sim operate`)",
+            "find the cause at the drive; then `operate acknowledge`, `on`, and `home`",
         ),
         FaultKind::LinkTimeout => (
             format!("no word of the host for {value} periods"),
@@ -188,7 +188,7 @@ pub fn fault(fault: Fault) -> (String, &'static str) {
         ),
         FaultKind::NotHomed => (
             "the machine is not homed: the position of its axes has not been declared".to_owned(),
-            "position the axes and declare their position: `run --home X,Y,Z`; or homing_required = false in [machine]",
+            "home it by its switches: `operate on`, `operate home`; or position the axes by hand and declare where they stand: `operate home X,Y,Z`. On a bench without axes: homing_required = false in [machine]",
         ),
         FaultKind::StepRate => (
             format!("an axis demands {value} steps in one period, more than the capacity of a period"),

@@ -54,9 +54,9 @@ pub(super) const ENTRIES: [Entry; 35] = [
         "state-forbids",
         "The state of the machine forbids this request.",
         "The state.",
-        "For instance a start without a job, or an upload during a run.",
-        "Abort the run, or wait for its end.",
-        "A custom host that sends `Start` before `JobEnd`.",
+        "A command for a run without one, such as `resume` at rest; or what a run forbids, such as a jog.",
+        "`cargo sim operate --port DEV status` tells the state, docs/operating.md which commands it allows. A run that is in the way: wait for its end, or `stop` it.",
+        "`operate resume` when nothing is held.",
     ),
     reason(
         6,
@@ -145,7 +145,7 @@ pub(super) const ENTRIES: [Entry; 35] = [
         "The drives are off.",
         "None.",
         "Drives are off after power-up, after an emergency stop or a drive fault, and after the command `off`.",
-        "`cargo sim operate --port DEV on`, then declare home. `cargo sim run` switches the drives on by itself.",
+        "`cargo sim operate --port DEV on`; after an emergency stop or a drive fault, `acknowledge` first. Then `home`. `cargo sim run` switches the drives on by itself.",
         "A custom host that starts a job right after power-up.",
     ),
     reason(

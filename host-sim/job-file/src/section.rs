@@ -93,7 +93,7 @@ impl<'t> Section<'t> {
             None => format!("unknown {word} `{key}`"),
         };
         let place = if self.name.is_empty() {
-            "a job".to_owned()
+            "this file".to_owned()
         } else {
             format!("[{}]", self.name)
         };

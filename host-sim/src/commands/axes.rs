@@ -8,7 +8,7 @@ use serde_json::json;
 
 use super::home::{self, PositionNm};
 use super::out::say;
-use super::{Failure, Result, run};
+use super::{Failure, Result, interrupt, run};
 use job::AXES;
 use machine::remote::Session;
 use machine::remote::axes;
@@ -178,7 +178,8 @@ pub(super) const fn moves(request: &Request) -> bool {
 
 /// Carries out a motion; an end other than the wanted one is a failure.
 fn carried_out(session: &mut Session, request: &Request) -> Result<MotionStatus> {
-    let motion = axes::go(session, request, |_| {})?;
+    interrupt::watch("Ctrl-C stops the axes along their ramp");
+    let motion = axes::go(session, request, || !interrupt::is_asked())?;
     match axes::failure(&motion) {
         None => Ok(motion),
         Some((what, remedy)) => Err(Failure::Failed(Some(format!(
@@ -219,6 +220,11 @@ fn letters(axes: u8) -> String {
 /// The axes whose position is not known.
 const fn unknown(motion: &MotionStatus) -> u8 {
     !motion.homed_axes & 0b111
+}
+
+/// Whether some axes are homed and others are not.
+pub(super) const fn is_homed_in_part(motion: &MotionStatus) -> bool {
+    !matches!(unknown(motion), 0 | 0b111)
 }
 
 /// Which axes are homed, and what is to be done for the others.

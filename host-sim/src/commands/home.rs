@@ -1,5 +1,6 @@
 //! The declared position of the axes: parsed from the command line, and checked against the start of the job.
 
+use clap::Args;
 use protocol::message::Reason;
 
 use super::{Result, read_job, settled};
@@ -43,6 +44,14 @@ pub(super) fn position(text: &str) -> std::result::Result<PositionNm, String> {
         (Some(x), Some(y), Some(z)) if axes.next().is_none() => Ok(PositionNm([x, y, z])),
         _ => Err("expected three numbers in mm, each within 2147, such as 0,0,50".to_owned()),
     }
+}
+
+/// Where a job lies in the machine.
+#[derive(Debug, Args)]
+pub(super) struct Placed {
+    /// Places the job's origin here, mm in machine coordinates, as `run --work` does: is it within the travel there?
+    #[arg(long, value_name = "X,Y,Z", value_parser = position, allow_hyphen_values = true)]
+    pub(super) origin: Option<PositionNm>,
 }
 
 /// Loads a job for a machine with this profile, its origin at this position of the machine; if it has no `home_mm`, it begins where the axes stand.

@@ -13,6 +13,7 @@ mod export;
 mod flash;
 mod home;
 mod import;
+mod interrupt;
 mod judge;
 mod link_words;
 mod log;
@@ -299,11 +300,6 @@ fn read_profile(path: Option<&PathBuf>) -> Result<Option<MachineProfile>> {
 /// Reads a job, chooses its direction if `along = "auto"`, and prepares it.
 fn load(path: &Path) -> Result<(Job, Prepared)> {
     settled(read_job(path, None)?)
-}
-
-/// The same on a machine with this profile.
-fn load_on(path: &Path, machine: Option<&PathBuf>) -> Result<(Job, Prepared)> {
-    settled(read_job(path, read_profile(machine)?.as_ref())?)
 }
 
 /// Chooses the direction of a job if `along = "auto"`, the start if `start = "auto"`, and prepares it.

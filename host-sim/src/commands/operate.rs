@@ -214,7 +214,10 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         }
     } else {
         print(&status, &board);
-        say!("  {}", axes::homed_words(&motion));
+        // All of them or none: the sentences say so.
+        if axes::is_homed_in_part(&motion) {
+            say!("  {}", axes::homed_words(&motion));
+        }
         say!("  axes at {} mm", home::PositionNm(motion.at_nm).words());
     }
     if stays {

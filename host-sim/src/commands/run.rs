@@ -74,8 +74,10 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "X,Y,Z", value_parser = home::position, allow_hyphen_values = true)]
     home: Option<PositionNm>,
     /// Places the job's origin at this work offset of the board (operate touch, zero). Default: the job's coordinates are the machine's.
-    #[arg(long, value_name = "N", requires = "port", value_parser = super::axes::work_number())]
+    #[arg(long, value_name = "N", requires = "port", conflicts_with = "origin", value_parser = super::axes::work_number())]
     work: Option<u8>,
+    #[command(flatten)]
+    placed: home::Placed,
     /// Goes on with the run of this job that a power cut, a fault or an abort has ended, at the beginning of the pass that was not complete. The axes have to be homed.
     #[arg(long, requires = "port")]
     resume: bool,
@@ -160,15 +162,16 @@ fn bench(arguments: &Arguments) -> Result<Bench> {
     let mut bench = Bench {
         connected: None,
         profile: given,
-        origin: None,
+        origin: arguments.placed.origin,
         stands: arguments.home,
     };
     if arguments.target.port.is_none() {
         return Ok(bench);
     }
     let (peer, mut session) = connect(arguments)?;
-    if given.is_none() {
-        bench.profile = session.profile()?.as_ref().map(profile::of_board);
+    match &given {
+        Some(given) => agree(arguments, given, &mut session)?,
+        None => bench.profile = session.profile()?.as_ref().map(profile::of_board),
     }
     if bench.stands.is_none() && session.status()?.safety.homed {
         bench.stands = Some(PositionNm(session.motion()?.at_nm));
@@ -181,26 +184,17 @@ fn bench(arguments: &Arguments) -> Result<Bench> {
     Ok(bench)
 }
 
-/// Makes sure that the board keeps this profile: a simulated one takes it, another one must have it.
-fn agree(arguments: &Arguments, wanted: Option<&MachineProfile>, session: &mut Session) -> Result<()> {
-    let Some(wanted) = wanted.map(profile::for_board) else {
-        return Ok(());
+/// Makes sure that the board keeps the profile that is given.
+fn agree(arguments: &Arguments, given: &MachineProfile, session: &mut Session) -> Result<()> {
+    let what = match session.status()?.profile {
+        kept if kept == profile::for_board(given).digest() => return Ok(()),
+        0 => "the board keeps no machine profile",
+        _ => "the board keeps another machine profile than the one given",
     };
-    let Some(port) = &arguments.target.port else {
-        return Ok(session.command(&Request::SetProfile(Some(wanted)))?);
-    };
-    let kept = session.status()?.profile;
-    if kept == wanted.digest() {
-        return Ok(());
-    }
-    let what = if kept == 0 {
-        "keeps no machine profile"
-    } else {
-        "keeps another machine profile"
-    };
+    let port = arguments.target.port.as_deref().unwrap_or("DEV");
     let file = arguments.machine.as_deref().unwrap_or(Path::new("machine.toml"));
     Err(Failure::Failed(Some(format!(
-        "the board {what} than the one given\n  help: write it: cargo sim settings --port {port} --machine {}; or omit --machine: the board's own is then used",
+        "{what}\n  help: write it: cargo sim settings --port {port} --machine {}; or omit --machine: the board's own is then used",
         file.display()
     ))))
 }
@@ -290,7 +284,6 @@ fn run_job(arguments: &Arguments, path: &Path, several: bool, bench: &mut Bench)
     if let Some(script) = &arguments.script {
         let scripted = scripted::play(&job, &prepared, script, None)?;
         let session = session_of(arguments, bench)?;
-        agree(arguments, profile.as_ref(), session)?;
         check_period(&job, session)?;
         make_ready(arguments, &job, &prepared, session)?;
         drive::upload(session, &prepared, |_| {})?;
@@ -309,7 +302,6 @@ fn run_job(arguments: &Arguments, path: &Path, several: bool, bench: &mut Bench)
         return Err(Failure::Failed(Some(fault.sentence_of(&job))));
     }
     let session = session_of(arguments, bench)?;
-    agree(arguments, profile.as_ref(), session)?;
     check_period(&job, session)?;
     make_ready(arguments, &job, &prepared, session)?;
     let bar = progress(prepared.words.len() as u64, "uploading");
@@ -373,11 +365,18 @@ fn run_job(arguments: &Arguments, path: &Path, several: bool, bench: &mut Bench)
     Ok(Ran { value, failure })
 }
 
-/// The session with the board: begun with the first job.
+/// The session with the board: begun with the first job. A simulated board takes the profile.
 fn session_of<'b>(arguments: &Arguments, bench: &'b mut Bench) -> Result<&'b mut Session> {
-    let connected = match bench.connected.take() {
-        Some(connected) => connected,
-        None => connect(arguments)?,
+    let connected = match (bench.connected.take(), &bench.profile) {
+        (Some(connected), _) => connected,
+        (None, profile) => {
+            let mut connected = connect(arguments)?;
+            if let Some(profile) = profile {
+                let profile = Some(profile::for_board(profile));
+                connected.1.command(&Request::SetProfile(profile))?;
+            }
+            connected
+        }
     };
     let (_, session) = bench.connected.insert(connected);
     Ok(session)

@@ -8,7 +8,7 @@ use serde_json::json;
 
 use super::out::say;
 use super::whole::Whole;
-use super::{Result, cannot_write, read_profile, run};
+use super::{Failure, Result, cannot_write, read_profile, run};
 use machine::profile;
 
 /// Reads the machine profile that a board keeps, or writes one: steps and directions, the greatest limits of the axes, travel, homing, heartbeat. It survives
@@ -68,6 +68,11 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
             Some(text) => say!("# machine profile of {board}\n{}", text.trim_end()),
             None => say!("{board} keeps no machine profile"),
         }
+    } else if text.is_none() {
+        return Err(Failure::Failed(Some(format!(
+            "{board} keeps no machine profile, so there is nothing to write into a file\n  help: write one to the board: cargo sim settings --port {} --machine machine.toml",
+            arguments.port
+        ))));
     }
     Ok(())
 }

@@ -14,8 +14,8 @@ use verify::survey::{SampleObserver, SurveyResult};
 
 use super::outcome::Outcome;
 use super::{
-    Bar, Failure, Result, WantedTrace, approach, begun, cannot_write, completed, load_on, scripted,
-    warn_of_limits, whole,
+    Bar, Failure, Result, WantedTrace, approach, begun, cannot_write, completed, home, read_profile,
+    scripted, warn_of_limits, whole,
 };
 
 /// Runs a job on this computer with the core of the firmware, bit-identical to the board, or with another approach of the paper.
@@ -31,6 +31,8 @@ pub(super) struct Arguments {
     /// Machine profile (TOML): what the job does not say of the machine is the profile's, and the job may not exceed it.
     #[arg(long, value_name = "FILE")]
     machine: Option<PathBuf>,
+    #[command(flatten)]
+    placed: home::Placed,
     /// Writes every sample as a row of this CSV file.
     #[arg(long, value_name = "FILE")]
     trace: Option<PathBuf>,
@@ -139,7 +141,8 @@ pub(super) fn report(
 }
 
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
-    let (job, prepared) = load_on(&arguments.job, arguments.machine.as_ref())?;
+    let profile = read_profile(arguments.machine.as_ref())?;
+    let (job, prepared) = home::load(&arguments.job, profile.as_ref(), arguments.placed.origin, None)?;
     arguments
         .script
         .iter()

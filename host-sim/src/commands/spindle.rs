@@ -10,7 +10,7 @@ use serde_json::json;
 
 use super::operate::{json_of as status_json, typed};
 use super::out::{say, to_stderr};
-use super::{Failure, Result, axes};
+use super::{Failure, Result, axes, interrupt};
 use machine::remote::operate::{act, spindle_words};
 use machine::remote::{RemoteError, Session};
 
@@ -110,7 +110,8 @@ pub(super) fn keep(session: &mut Session, seconds: Option<f64>, as_json: bool) -
             }
         }
     });
-    while end.is_none_or(|end| Instant::now() < end) {
+    interrupt::watch("Ctrl-C switches it off");
+    while !interrupt::is_asked() && end.is_none_or(|end| Instant::now() < end) {
         match lines.recv_timeout(LOOK) {
             Ok(line) if matches!(line.trim(), "off" | "q") => break,
             Ok(line) => obey(session, &line)?,

@@ -40,9 +40,8 @@ pub(super) struct Arguments {
     /// Machine profile (TOML): what the job does not say of the machine is the profile's, and the job may not exceed it.
     #[arg(long, value_name = "FILE")]
     machine: Option<PathBuf>,
-    /// Places the job's origin here, mm in machine coordinates, as `run --work` does: is it within the travel there?
-    #[arg(long, value_name = "X,Y,Z", value_parser = home::position, allow_hyphen_values = true)]
-    origin: Option<home::PositionNm>,
+    #[command(flatten)]
+    placed: home::Placed,
     /// Writes a report page into this folder: 3D view, charts, figures. With several jobs: a folder for each in it.
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
@@ -342,7 +341,7 @@ fn summary(values: &[Value]) {
 /// Verifies one job and prints its figures unless JSON is requested. Returns whether it passed, and its JSON object.
 fn verify_job(arguments: &Arguments, path: &Path, directory: Option<&Path>) -> Result<(bool, Value)> {
     let profile = read_profile(arguments.machine.as_ref())?;
-    let (job, prepared) = home::load(path, profile.as_ref(), arguments.origin, None)?;
+    let (job, prepared) = home::load(path, profile.as_ref(), arguments.placed.origin, None)?;
     let directory = WantedReport::new(directory, arguments.force)?;
     let timed = timed(&job, &prepared)?;
     let original = original(&job)?;

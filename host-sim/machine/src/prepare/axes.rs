@@ -38,7 +38,9 @@ pub(super) fn axes(job: &Job, tool_sign: f64, start: [f64; 2]) -> Result<Option<
     let (home_nm, safe_z_nm) = (home_mm.map(nanometres), nanometres(safe_z_mm));
     let [_, _, z] = travel_nm;
     if !(z[0]..=z[1]).contains(&safe_z_nm) {
-        let what = format!("the safe height, z = {safe_z_mm:.3} mm, is outside the travel of z");
+        let [low, high] = z.map(|nm| f64::from(nm) * 1e-6);
+        let what =
+            format!("the safe height, z = {safe_z_mm:.3} mm, is outside the travel of z, {low} to {high} mm");
         return Err(job.origin.error(
             if machine.safe_z_mm.is_some() {
                 "machine.safe_z_mm"
@@ -46,7 +48,7 @@ pub(super) fn axes(job: &Job, tool_sign: f64, start: [f64; 2]) -> Result<Option<
                 "machine.travel_mm"
             },
             what,
-            "move the part down with [placement], or give a lower `safe_z_mm` above the whole part",
+            "place the part where it lies in the machine: --work N after touch-off, or --origin X,Y,Z, or [placement]; or give a lower `safe_z_mm` above the whole part",
         ));
     }
     for ((axis, place), [least, most]) in ["x", "y", "z"].iter().zip(home_nm).zip(travel_nm) {
@@ -59,7 +61,7 @@ pub(super) fn axes(job: &Job, tool_sign: f64, start: [f64; 2]) -> Result<Option<
                     "machine.travel_mm"
                 },
                 what,
-                "give `home_mm` within `travel_mm`, or move the part with [placement]",
+                "give `home_mm` within `travel_mm`, or place the part where it lies in the machine: --work N after touch-off, or --origin X,Y,Z, or [placement]",
             ));
         }
     }

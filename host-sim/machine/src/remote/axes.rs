@@ -9,38 +9,43 @@ use super::session::{RemoteError, Session};
 /// Interval of the requests that keep a motion going.
 const LOOK: Duration = Duration::from_millis(20);
 
-/// Asks for a motion, and follows it until the axes rest. `each` is called with every position on the way.
+/// Asks for a motion, and follows it until the axes rest. `goes_on` is asked on the way; at its first no the axes are stopped along their ramp.
 ///
 /// # Errors
 /// The line breaks, or the board refuses.
 pub fn go(
     session: &mut Session,
     request: &Request,
-    mut each: impl FnMut(&MotionStatus),
+    mut goes_on: impl FnMut() -> bool,
 ) -> Result<MotionStatus, RemoteError> {
     session.command(request)?;
-    std::thread::sleep(LOOK);
-    until_rest(session, &mut each)
+    loop {
+        std::thread::sleep(LOOK);
+        let motion = session.motion()?;
+        if motion.activity == Activity::Rest {
+            return Ok(motion);
+        }
+        if !goes_on() {
+            return stop(session);
+        }
+    }
 }
 
-/// Waits until the axes rest.
+/// Stops axes that move, along their ramp, and waits until they rest.
 ///
 /// # Errors
 /// The line breaks.
-pub fn rest(session: &mut Session) -> Result<MotionStatus, RemoteError> {
-    until_rest(session, &mut |_| {})
-}
-
-fn until_rest(
-    session: &mut Session,
-    each: &mut impl FnMut(&MotionStatus),
-) -> Result<MotionStatus, RemoteError> {
+pub fn stop(session: &mut Session) -> Result<MotionStatus, RemoteError> {
+    match session.command(&Request::Hold) {
+        // At rest by now.
+        Ok(()) | Err(RemoteError::Refused { .. }) => {}
+        Err(error) => return Err(error),
+    }
     loop {
         let motion = session.motion()?;
         if motion.activity == Activity::Rest {
             return Ok(motion);
         }
-        each(&motion);
         std::thread::sleep(LOOK);
     }
 }

@@ -1,5 +1,6 @@
 //! A board behind a serial port.
 
+use std::io::{Error, ErrorKind};
 use std::time::Duration;
 
 use super::{RemoteError, Stream};
@@ -18,6 +19,12 @@ pub fn open(name: &str) -> Result<Box<dyn Stream>, RemoteError> {
     let port = serialport::new(name, BAUD)
         .timeout(Duration::from_millis(20))
         .open()
-        .map_err(|error| RemoteError::Line(error.into()))?;
+        .map_err(|error| match error.kind {
+            // Its word for a port that is locked.
+            serialport::ErrorKind::NoDevice => {
+                Error::new(ErrorKind::ResourceBusy, "another program has the port open")
+            }
+            _ => error.into(),
+        })?;
     Ok(Box::new(port))
 }

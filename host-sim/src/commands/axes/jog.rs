@@ -84,9 +84,7 @@ pub(in super::super) fn by_keys(session: &mut Session) -> Result<()> {
         let key = std::iter::once(first).chain(keys.try_iter().map(Ok)).last();
         match key {
             Some(Ok(Key::Escape | Key::Char('q' | 'Q') | Key::CtrlC)) => {
-                // At rest it is refused.
-                session.command(&Request::Hold).ok();
-                axes::rest(session)?;
+                axes::stop(session)?;
                 to_stderr(format_args!(""));
                 return Ok(());
             }

@@ -1,5 +1,7 @@
 //! The board, QEMU or chip emulator that a run is for, and the session with it.
 
+use std::io::ErrorKind;
+
 use super::super::flash::board_of;
 use super::super::out::say;
 use super::super::{Failure, Result, spinner};
@@ -18,14 +20,18 @@ fn session_number() -> u32 {
 /// Opens a session with the board at this serial port.
 pub(in super::super) fn open_port(name: &str) -> Result<Session> {
     let stream = port::open(name).map_err(|error| {
-        let why = match error {
-            RemoteError::Line(cause) => format!("cannot open it as a serial port: {cause}"),
-            other => other.to_string(),
+        let (why, remedy) = match error {
+            RemoteError::Line(cause) if cause.kind() == ErrorKind::ResourceBusy => (
+                cause.to_string(),
+                "type the command there, or end that program",
+            ),
+            RemoteError::Line(cause) => (
+                format!("cannot open it as a serial port: {cause}"),
+                "name the board's serial port, such as /dev/ttyUSB0; without permission: add yourself to the group of the port (`ls -l`), mostly dialout",
+            ),
+            other => (other.to_string(), "name the board's serial port, such as /dev/ttyUSB0"),
         };
-        Failure::input(
-            format!("{name}: {why}"),
-            "name the board's serial port, such as /dev/ttyUSB0",
-        )
+        Failure::input(format!("{name}: {why}"), remedy)
     })?;
     Ok(Session::open(stream, session_number())?)
 }

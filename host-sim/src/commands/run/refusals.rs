@@ -32,7 +32,10 @@ impl From<RemoteError> for Failure {
             RemoteError::Version(_) => "R3".to_owned(),
             _ => return Self::Failed(Some(error.to_string())),
         };
-        Self::Failed(Some(format!("{error}\n  help: cargo sim explain {code}")))
+        let remedy = explain::entry(&code).map_or("", |entry| entry.remedy);
+        Self::Failed(Some(format!(
+            "{error}\n  help: {remedy}\n        cargo sim explain {code}"
+        )))
     }
 }
 
