@@ -121,50 +121,6 @@ fn a_full_disk_is_an_error() {
     );
 }
 
-/// The job of the bring-up guide has the directions and lengths that the guide states.
-#[test]
-fn the_guides_job_goes_where_the_guide_says() {
-    let guide = include_str!("../../docs/bring-up.md");
-    let job = guide
-        .split("```toml")
-        .nth(1)
-        .unwrap()
-        .split("```")
-        .next()
-        .unwrap();
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("axes.toml"), job).unwrap();
-    let output = run(folder.path(), "simulate axes.toml --trace axes.csv");
-    assert_eq!(output.status.code(), Some(0), "{}", err(&output));
-    let mut passes: Vec<Vec<[f64; 3]>> = Vec::new();
-    let mut rows = csv::Reader::from_path(folder.path().join("axes.csv")).unwrap();
-    for row in rows.records().map(|row| row.unwrap()) {
-        if &row[2] == "running" {
-            let pass: usize = row[3].parse().unwrap();
-            passes.resize(passes.len().max(pass + 1), Vec::new());
-            let cl_mm = [10, 11, 12].map(|column| row[column].parse::<f64>().unwrap() / 1e6);
-            passes[pass].push(cl_mm);
-        }
-    }
-    assert!(passes.len() > 5, "{} passes", passes.len());
-    let mut y_before = -1.0;
-    for (number, pass) in passes.iter().enumerate() {
-        let (first, last) = (pass[0], pass[pass.len() - 1]);
-        let ends = if number % 2 == 0 { [0.0, 50.0] } else { [50.0, 0.0] };
-        assert!(
-            (first[0] - ends[0]).abs() < 0.02 && (last[0] - ends[1]).abs() < 0.02,
-            "{first:?} {last:?}"
-        );
-        assert!(
-            pass.iter()
-                .all(|cl| cl[1] == first[1] && (cl[2] - 55.0).abs() < 1e-5)
-        );
-        assert!(first[1] > y_before);
-        y_before = first[1];
-    }
-    assert!((y_before - 50.0).abs() < 1e-5, "{y_before}");
-}
-
 /// Every kind of invalid input ends with code 2, an error and a remedy.
 #[test]
 fn nonsense_gets_a_remedy() {
