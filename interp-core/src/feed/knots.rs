@@ -28,10 +28,12 @@ pub(super) fn find_knots(plan: &mut Plan, index: u16, limits: &MotionLimits) {
         }
         let feed = limits.feed;
         let jerk = limits.jump_jerk(&plan.stations.jump(station));
-        if !jerk
+        // Where a turn begins, the third derivative jumps, and much happens between two nodes.
+        let bends = plan.is_near_turn(plan.stations.get(station).arc_nm);
+        let matters = jerk
             .iter()
-            .any(|[first, second]| (first + second * feed) * feed > 0.01)
-        {
+            .any(|[first, second]| (first + second * feed) * feed > 0.01);
+        if !bends && !matters {
             continue;
         }
         let arc_of = |station| plan.stations.get(station).arc_nm;

@@ -122,6 +122,16 @@ impl MotionLimits {
         Self::of(self.feed, axes, self.inverse_chord, self.period)
     }
 
+    /// The same with accelerations and jerks relaxed by a factor.
+    pub(crate) fn relaxed(&self, by: f32) -> Self {
+        let axes = self.axes.map(|axis| AxisMotion {
+            acceleration: by * axis.acceleration,
+            jerk: by * axis.jerk,
+            ..axis
+        });
+        Self::of(self.feed, axes, self.inverse_chord, self.period)
+    }
+
     /// What a plan uses of them.
     pub(crate) fn planned(&self) -> Self {
         let axes = self.axes.map(|axis| AxisMotion {

@@ -24,10 +24,12 @@ const AFTER_CUT: f32 = 1.5;
 /// The greatest weight in the last steps, and how many those are.
 const BARRIER_AT_END: f32 = 7e-4;
 const STEPS_AT_END: u16 = 2;
-/// Most steps from rest to rest. Otherwise: usual, and few.
+/// The last weight with an end at speed: what the plan leaves of the limits is what the last stop before the end begins with.
+const BARRIER_LAST_AT_SPEED: f32 = 1e-3;
+/// Most steps from rest to rest; with an end at speed, and the fewest.
 const STEPS_MAX: u8 = 18;
-const STEPS: u8 = 12;
-const STEPS_FEW: u8 = 7;
+const STEPS_AT_SPEED: u8 = 12;
+const STEPS_LEAST: u8 = 9;
 /// Share of the time that a motion takes after the first steps, and after some more, that the plan takes about.
 const LASTS_FIRST: f32 = 0.72;
 const LASTS: f32 = 0.9;
@@ -35,22 +37,29 @@ const STEPS_SOME: u8 = 7;
 /// Periods that a step of the method takes for each node and apart from them, the check for each period of the plan, and what is left.
 const PERIODS_A_STEP: f32 = 0.27;
 const PERIODS_OF_STEP: f32 = 3.0;
-const PERIODS_A_PLACE: f32 = 0.073;
+const PERIODS_A_PLACE: f32 = 0.07;
 const PERIODS_LEFT: f32 = 3.0;
+/// The same of the search for the last stop before an end at speed, with that stop.
+const PERIODS_OF_STOP: f32 = 280.0;
 
 /// Share of the greatest factor of the walk's pace that the method starts from.
 const START_SHARE: f32 = 0.85;
 
 /// Share of the caps that a walk uses near an end at speed, so that the method can start from its own pace there.
-const WALK_NEAR_TURN: f32 = 0.25;
+const WALK_NEAR_TURN: f32 = 0.3;
 /// Coefficients over which the start goes from the pace near an end at speed to the factor.
 const BLENDED: u16 = 30;
 
 /// Share of the planned jerk that is used in a turn.
-const TURN_JERK: f32 = 0.88;
+const TURN_JERK: f32 = 0.92;
+
+/// Room above the greatest use of a limit by which limits are relaxed.
+const RELAXED: f32 = 1.05;
 
 /// Use of the jerk that the check passes: a plan with more is slowed down.
 const JERK_CHECKED: f32 = 0.998;
+/// In a turn the third derivative bends between stations: the jerk is up to this much more than the check finds.
+const JERK_IN_TURN: f32 = 1.04;
 
 /// Cycles of the pieces of work in a period's planning, of which the first may take more, by the pessimistic model of `cargo sim budget`.
 pub(crate) const PORTION_CYCLES: u32 = 24_000;
@@ -81,6 +90,8 @@ enum Stage {
     Factor,
     /// Takes the factor.
     Scale,
+    /// Finds by how much the limits are relaxed for the next step.
+    Relax,
     Assemble,
     Solve,
     Reach,
@@ -114,6 +125,8 @@ pub(crate) struct Planner {
     machine: MotionLimits,
     limits: MotionLimits,
     turn_limits: MotionLimits,
+    /// Factor by which both are relaxed as long as the pace does not keep them.
+    relaxed: f32,
     sweep: Sweep,
     /// Steps of the method so far, and the weight of its barrier.
     step: u8,
@@ -143,6 +156,7 @@ impl Planner {
         machine: MotionLimits::NONE,
         limits: MotionLimits::NONE,
         turn_limits: MotionLimits::NONE,
+        relaxed: 1.0,
         sweep: Sweep::START,
         step: 0,
         barrier: BARRIER_FIRST,
@@ -163,8 +177,7 @@ impl Planner {
     pub(crate) fn begin(&mut self, plan: &mut Plan) {
         plan.change = FeedChange::new(&plan.limits);
         self.machine = plan.limits;
-        self.limits = plan.limits.planned();
-        self.turn_limits = self.limits.with_less_jerk(TURN_JERK);
+        self.relax(1.0);
         self.walker.begin(plan.limits.period, WALK_NEAR_TURN);
         self.stage = Stage::Walk;
     }
@@ -187,9 +200,13 @@ impl Planner {
     pub(crate) fn least_left(&self, plan: &Plan) -> f32 {
         let (steps, checked) = match self.stage {
             Stage::Walk | Stage::Weigh | Stage::Finish | Stage::Gate | Stage::Done => return 0.0,
-            Stage::Factor | Stage::Scale | Stage::Assemble | Stage::Solve | Stage::Reach | Stage::Take => {
-                (STEPS_FIRST.saturating_sub(self.step), 0)
-            }
+            Stage::Factor
+            | Stage::Scale
+            | Stage::Relax
+            | Stage::Assemble
+            | Stage::Solve
+            | Stage::Reach
+            | Stage::Take => (STEPS_FIRST.saturating_sub(self.step), 0),
             Stage::Check => (0, self.periods),
         };
         let check = PERIODS_A_PLACE * (self.lasts - to_f32(checked)).at_least(0.0) + PERIODS_LEFT;
@@ -205,7 +222,7 @@ impl Planner {
         };
         match self.stage {
             Stage::Walk => self.walker.cycles(),
-            Stage::Factor => cycles::FACTOR + jump,
+            Stage::Factor | Stage::Relax => cycles::FACTOR + jump,
             Stage::Assemble => cycles::ASSEMBLE + jump,
             Stage::Solve => cycles::SOLVE,
             Stage::Reach => cycles::REACH + jump,
@@ -257,7 +274,19 @@ impl Planner {
                     scale(plan, draft_mut(&mut self.lists), factor);
                 }
                 newton::clear(&mut self.lists);
-                Stage::Assemble
+                self.begin_step(plan)
+            }
+            Stage::Relax => {
+                let limits = limits_at(plan, &self.sweep, [&self.limits, &self.turn_limits]);
+                let used = newton::most_used(plan, limits, &self.lists, &mut self.sweep);
+                self.factor = self.factor.at_least(used);
+                if self.sweep.next(plan) {
+                    let used = self.relaxed * self.factor;
+                    self.relax(if used < 1.0 { 1.0 } else { RELAXED * used });
+                    Stage::Assemble
+                } else {
+                    Stage::Relax
+                }
             }
             Stage::Assemble => {
                 let limits = limits_at(plan, &self.sweep, [&self.limits, &self.turn_limits]);
@@ -278,7 +307,7 @@ impl Planner {
             Stage::Solve => {
                 let [start, end] = plan.pinned();
                 newton::solve(&mut self.lists, plan.intervals + 2 - end, start);
-                self.reach = Reach::far(plan.pinned() != [0; 2]);
+                self.reach = Reach::FAR;
                 Stage::Reach
             }
             Stage::Reach => {
@@ -318,6 +347,25 @@ impl Planner {
         };
     }
 
+    /// What the plan may use of the limits, relaxed by a factor.
+    fn relax(&mut self, by: f32) {
+        self.relaxed = by;
+        self.limits = self.machine.planned().relaxed(by);
+        self.turn_limits = self.limits.with_less_jerk(TURN_JERK);
+    }
+
+    /// Begins a step. With an end at speed the pace of the walk may not keep the limits there: they are relaxed to what it uses, and drawn in again
+    /// with each step, so that every row holds from the first step on.
+    fn begin_step(&mut self, plan: &Plan) -> Stage {
+        let is_first = self.step == 0 && plan.pinned() != [0; 2];
+        if is_first || self.relaxed > 1.0 {
+            self.factor = 0.0;
+            Stage::Relax
+        } else {
+            Stage::Assemble
+        }
+    }
+
     /// Periods that a step of the method takes: as many as the last one, if there is one.
     fn periods_of_step(&self, plan: &Plan) -> f32 {
         if self.step > 1 {
@@ -327,28 +375,28 @@ impl Planner {
         }
     }
 
-    /// Steps that there is time for. From rest to rest the plan is slowed down to what its planning takes, so one that comes too late makes it slower; and
-    /// the tool stands where the pass before is over first. `lasts`: periods of the motion.
+    /// Steps that there is time for. A plan is slowed down to what its planning takes, so one that comes too late makes it slower; and the tool stands where
+    /// the pass before is over first. With an end at speed the next plan has to be complete before the last stop. `lasts`: periods of the motion.
     fn steps_left(&self, plan: &Plan, lasts: f32, Deadlines { least, left, .. }: Deadlines) -> u16 {
-        let most = if plan.pinned() == [0; 2] {
-            STEPS_MAX
-        } else if self.walker.is_short {
-            STEPS_FEW
+        let is_between = plan.pinned() != [0; 2];
+        let [fewest, most] = if is_between {
+            [STEPS_LEAST, STEPS_AT_SPEED]
         } else {
-            STEPS
+            [0, STEPS_MAX]
         };
-        let most_left = u16::from(most.saturating_sub(self.step));
-        if most < STEPS_MAX {
-            return most_left;
-        }
+        let [fewest, most] = [fewest, most].map(|steps| f32::from(steps.saturating_sub(self.step)));
+        let stop = if plan.goes_on() { PERIODS_OF_STOP } else { 0.0 };
         let own = if least == 0 {
             f32::MAX
         } else {
-            lasts - to_f32(least)
+            lasts - stop - to_f32(least)
         };
-        let left = own.at_most(left.unwrap_or(f32::MAX)) - PERIODS_A_PLACE * lasts - PERIODS_LEFT;
-        let steps = (left.at_least(0.0) / self.periods_of_step(plan)).at_most(f32::from(most_left));
-        u16::try_from(truncated(steps)).unwrap_or(most_left)
+        let left = left.filter(|_| !is_between).unwrap_or(f32::MAX);
+        let left = own.at_most(left) - PERIODS_A_PLACE * lasts - PERIODS_LEFT;
+        let steps = (left.at_least(0.0) / self.periods_of_step(plan))
+            .at_least(fewest)
+            .at_most(most);
+        u16::try_from(truncated(steps)).unwrap_or(u16::MAX)
     }
 
     /// Whether another step is to be taken; chooses its barrier.
@@ -358,7 +406,12 @@ impl Planner {
         }
         let lasts = self.lasts;
         let went = self.reach.step();
-        let is_solved = self.barrier <= BARRIER_LAST && went >= 1.0;
+        let last = if plan.pinned() == [0; 2] {
+            BARRIER_LAST
+        } else {
+            BARRIER_LAST_AT_SPEED
+        };
+        let is_solved = self.barrier <= last && went >= 1.0;
         if is_solved || self.steps_left(plan, lasts, deadlines) == 0 {
             return false;
         }
@@ -379,7 +432,9 @@ impl Planner {
         } else {
             BARRIER_FIRST
         };
-        self.barrier = (change * self.barrier).at_least(BARRIER_LAST).at_most(most);
+        if self.relaxed == 1.0 {
+            self.barrier = (change * self.barrier).at_least(last).at_most(most);
+        }
         true
     }
 
@@ -418,7 +473,7 @@ impl Planner {
         self.taken = deadlines.spent;
         self.lasts = self.lasts(plan);
         if self.goes_on(plan, deadlines) {
-            return Stage::Assemble;
+            return self.begin_step(plan);
         }
         self.begin_check(plan);
         Stage::Check
@@ -438,7 +493,11 @@ impl Planner {
             self.lead.look_draft(plan, draft(&self.lists), &self.cursor);
             self.lead.cursor = self.cursor;
         }
-        let here = plan.use_draft(draft(&self.lists), &self.machine, &self.cursor);
+        let mut here = plan.use_draft(draft(&self.lists), &self.machine, &self.cursor);
+        let [cell, _] = plan.node(self.cursor.interval);
+        if plan.is_near_turn(plan.stations.get(cell).arc_nm) {
+            here.jerk *= JERK_IN_TURN;
+        }
         self.most.add(&here);
         if here.velocity > here.feed {
             plan.forbid_feed(self.cursor.interval);

@@ -17,8 +17,8 @@ pub(crate) const CELLS: u16 = 10;
 pub(crate) const STATIONS: u16 = CELLS + 1;
 
 /// Length of the plan's arc along a turn, for the time t that the step takes at its jerk limit, as a multiple of a t^2 and of v t.
-const REVERSAL: f32 = 3.0;
-const CRUISE: f32 = 4.0;
+const REVERSAL: f32 = 4.0;
+const CRUISE: f32 = 2.4;
 /// Time of a step from rest to rest at its jerk limit, as a multiple of the cube root of distance over jerk: 4 / 2^(1/3).
 const STEP_TIME: f32 = 3.17;
 /// Greatest time of a turn at the speed of its apex, as a multiple of that of two rests and the step.
@@ -30,8 +30,8 @@ pub(crate) const ROUNDS: u8 = 4;
 const HALF_MIN_MM: f32 = 0.05;
 
 /// Shares of the limits at the apex.
-const ACCELERATION_SHARE: f32 = 0.9;
-const JERK_SHARE: f32 = 0.65;
+const ACCELERATION_SHARE: f32 = 1.0;
+const JERK_SHARE: f32 = 0.8;
 
 /// The end of a pass at a turn.
 #[derive(Clone, Copy, Debug)]

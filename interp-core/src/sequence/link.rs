@@ -29,6 +29,8 @@ const BEND_JERK_SHARE: f32 = 0.6;
 
 /// Knots of a step-over that are looked at.
 const KNOTS_MAX: u16 = 4;
+/// What the greatest product of speed and acceleration of a rise is less than that of their greatest values, where the jerk alone bounds it: 1 - (2/3)^(3/2).
+const V_TIMES_A: f32 = 0.456;
 /// Share of the jerk that a jump of the direction may take in the periods that see it.
 const JUMP_JERK_SHARE: f32 = 0.1;
 
@@ -603,8 +605,16 @@ impl BoundaryStepOver {
             let room = (axis.acceleration - second * peak * peak).at_least(0.2 * axis.acceleration);
             left.acceleration = left.acceleration.at_most(room / first.at_least(SLOPE_MIN));
         }
+        let mut jerk = f32::MAX;
+        for (axis, [first, ..]) in self.limits.axes.iter().zip(&self.bends) {
+            jerk = jerk.at_most(axis.jerk / first.at_least(SLOPE_MIN));
+        }
+        // Speed and acceleration are greatest one after the other: v a <= (1 - 0.456 p) v_max a_max, with p the share of the rise in which the jerk is at its limit.
+        let acceleration = left.acceleration.at_most(sqrt(jerk * peak));
+        let rise = acceleration * acceleration / (jerk * peak).at_least(1e-9);
+        let product = (1.0 - V_TIMES_A * rise) * peak * acceleration;
         for (axis, [first, second, third]) in self.limits.axes.iter().zip(&self.bends) {
-            let taken = (third * peak * peak + 3.0 * second * left.acceleration) * peak;
+            let taken = third * peak * peak * peak + 3.0 * second * product;
             let room = (axis.jerk - taken).at_least(0.15 * axis.jerk);
             left.jerk = left.jerk.at_most(room / first.at_least(SLOPE_MIN));
         }

@@ -46,6 +46,18 @@ pub(crate) fn factor(plan: &Plan, limits: &MotionLimits, lists: &Lists, sweep: &
     factor
 }
 
+/// The greatest use of an acceleration or a jerk at a node and behind it.
+#[inline(never)]
+pub(crate) fn most_used(plan: &Plan, limits: &MotionLimits, lists: &Lists, sweep: &mut Sweep) -> f32 {
+    let (place, _) = at_node(plan, limits, sweep);
+    let mut most = place.most_used(limits, &local(draft(lists), sweep.node, plan.intervals));
+    let coefficients = three(lists, sweep.node);
+    at_jumps(plan, limits, sweep, &mut |place, weights| {
+        most = most.at_least(place.most_used(limits, &at_stencil(weights, &coefficients)));
+    });
+    most
+}
+
 /// A coefficient's share of the time.
 fn share(lists: &Lists, weight: f32, index: u16) -> f32 {
     weight * inverse_sqrt(get(lists, SHAPE, index).at_least(1e-9))

@@ -97,6 +97,22 @@ impl Place {
         factor
     }
 
+    /// The greatest use of an acceleration or a jerk.
+    pub(super) fn most_used(&self, limits: &MotionLimits, pace: &Local) -> f32 {
+        let Local { c, c1, c2 } = *pace;
+        let root = inverse_sqrt(c.at_least(1e-12));
+        let mut most = 0.0_f32;
+        self.rows(limits, |rows| {
+            most = most.at_least((rows.x0 * c + rows.x1 * c1).abs());
+            let left = (1.0 - rows.e2 * c) * root - rows.e1;
+            let inverse = 1.0 / left.at_least(1e-3 * root);
+            for (y0, c2) in rows.y0.iter().zip(&c2) {
+                most = most.at_least((y0 * c + rows.y1 * c1 + rows.y2 * c2).abs() * inverse);
+            }
+        });
+        most
+    }
+
     /// Derivatives of the barrier of every row, times `mu`.
     #[inline(always)]
     pub(super) fn barrier(&self, limits: &MotionLimits, pace: &Local, mu: f32, sums: &mut Sums) {
@@ -197,8 +213,6 @@ const FACTOR_STEP: f32 = 0.85;
 pub(crate) struct Reach {
     slack: f32,
     loss: f32,
-    /// Rows that do not hold, which the start next to an end at speed may have, do not bound the step.
-    passes: bool,
 }
 
 impl Reach {
@@ -206,25 +220,15 @@ impl Reach {
     pub(crate) const NONE: Self = Self {
         slack: 0.0,
         loss: 0.0,
-        passes: false,
     };
 
     /// No row is used up.
     pub(crate) const FAR: Self = Self {
         slack: 1.0,
         loss: 0.0,
-        passes: false,
     };
 
-    /// Far, for a plan with an end at speed or without.
-    pub(crate) fn far(passes: bool) -> Self {
-        Self { passes, ..Self::FAR }
-    }
-
     pub(super) fn add(&mut self, slack: f32, loss: f32) {
-        if self.passes && slack <= 0.0 {
-            return;
-        }
         if loss * self.slack > slack * self.loss {
             (self.slack, self.loss) = (slack, loss);
         }

@@ -74,8 +74,6 @@ pub(crate) struct Walker {
     duration: f32,
     mean_s: f32,
     intervals: u16,
-    /// The plan takes no longer than its planning: the fewest steps are to be made.
-    pub(crate) is_short: bool,
     busy: u16,
     vary: Vary,
     low: f32,
@@ -120,7 +118,6 @@ impl Walker {
         duration: 0.0,
         mean_s: 0.0,
         intervals: 0,
-        is_short: false,
         busy: 0,
         vary: Vary::Even,
         low: 0.0,

@@ -156,4 +156,4 @@ impl Lookahead {
 }
 
 /// Passes without a turn after one whose plan had to be slowed down for it.
-const PASSES_WITHOUT: u8 = 15;
+const PASSES_WITHOUT: u8 = 3;

@@ -20,6 +20,7 @@ use crate::sequence::turning::road;
 
 /// Periods that a pass takes longer than the planning of the next one.
 const SPARE_PERIODS: u32 = 15;
+const SPARE_BEFORE_TURN: u32 = 30;
 
 /// Cycles of one place of a search for a change of the pace, along a pass and along a link, and of its begin along a pass; of a portion of a
 /// step-over's planning.
@@ -48,8 +49,8 @@ const WAIT_PACE_MIN: f32 = 0.02;
 const REPLANNED: f32 = 1.001;
 
 /// Periods that planning takes: a node, a whole pass apart from its nodes.
-const PERIODS_A_NODE: f32 = 3.4;
-const PERIODS_A_PASS: f32 = 100.0;
+const PERIODS_A_NODE: f32 = 3.3;
+const PERIODS_A_PASS: f32 = 98.0;
 /// How much longer the planning of a pass may take than that of the last one, as a ratio, and apart from that, periods.
 const LONGER: f32 = 1.3;
 const LONGER_PERIODS: f32 = 30.0;
@@ -358,7 +359,15 @@ impl Sequencer {
                     } else {
                         0
                     };
-                    self.spent.saturating_add(front).saturating_add(SPARE_PERIODS)
+                    {
+                        // Before a turn the next plan has to be complete in time: one of two passes has the longer planning.
+                        let spare = if next.turns() {
+                            SPARE_BEFORE_TURN
+                        } else {
+                            SPARE_PERIODS
+                        };
+                        self.spent.saturating_add(front).saturating_add(spare)
+                    }
                 } else {
                     0
                 };
