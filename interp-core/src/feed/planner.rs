@@ -29,7 +29,7 @@ const BARRIER_LAST_AT_SPEED: f32 = 1e-3;
 /// Most steps from rest to rest; with an end at speed, and the fewest.
 const STEPS_MAX: u8 = 18;
 const STEPS_AT_SPEED: u8 = 12;
-const STEPS_LEAST: u8 = 9;
+const STEPS_LEAST: u8 = 8;
 /// Share of the time that a motion takes after the first steps, and after some more, that the plan takes about.
 const LASTS_FIRST: f32 = 0.72;
 const LASTS: f32 = 0.9;
@@ -40,7 +40,7 @@ const PERIODS_OF_STEP: f32 = 3.0;
 const PERIODS_A_PLACE: f32 = 0.07;
 const PERIODS_LEFT: f32 = 3.0;
 /// The same of the search for the last stop before an end at speed, with that stop.
-const PERIODS_OF_STOP: f32 = 280.0;
+const PERIODS_OF_STOP: f32 = 400.0;
 
 /// Share of the greatest factor of the walk's pace that the method starts from.
 const START_SHARE: f32 = 0.85;
@@ -51,7 +51,7 @@ const WALK_NEAR_TURN: f32 = 0.3;
 const BLENDED: u16 = 30;
 
 /// Share of the planned jerk that is used in a turn.
-const TURN_JERK: f32 = 0.92;
+const TURN_JERK: f32 = 0.9;
 
 /// Room above the greatest use of a limit by which limits are relaxed.
 const RELAXED: f32 = 1.05;

@@ -30,8 +30,8 @@ pub(crate) const ROUNDS: u8 = 4;
 const HALF_MIN_MM: f32 = 0.05;
 
 /// Shares of the limits at the apex.
-const ACCELERATION_SHARE: f32 = 1.0;
-const JERK_SHARE: f32 = 0.8;
+const ACCELERATION_SHARE: f32 = 0.95;
+const JERK_SHARE: f32 = 0.75;
 
 /// The end of a pass at a turn.
 #[derive(Clone, Copy, Debug)]

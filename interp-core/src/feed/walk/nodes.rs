@@ -23,12 +23,12 @@ const SPACING_WORTH: f32 = 4e-3;
 pub(super) const MEAN_MAX: f32 = 0.05;
 
 /// Periods that the rest of the planning takes: for a node, for a place of the check, and for what is left.
-const PERIODS_A_NODE: f32 = 2.8;
+const PERIODS_A_NODE: f32 = 2.5;
 const PERIODS_A_PLACE: f32 = 0.067;
 const PERIODS_A_PLAN: f32 = 52.0;
 
 /// The same for the last stop before a turn, and the shares of the walk's time that a plan takes: with an end at speed, and from rest to rest.
-const PERIODS_A_STOP: f32 = 180.0;
+const PERIODS_A_STOP: f32 = 200.0;
 const WALKED: f32 = 0.75;
 const WALKED_TO_REST: f32 = 0.7;
 
