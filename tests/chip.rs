@@ -9,8 +9,10 @@ mod card;
 mod disturbed;
 mod emulated;
 mod guide;
+mod jobs;
 mod levels;
 mod machine;
+mod power;
 mod pulses;
 mod settings;
 
@@ -46,6 +48,20 @@ fn the_images_boot_as_their_registers_say() {
             "{}: BLESS=1 writes it",
             board.id
         );
+    }
+}
+
+/// The stack bound derived from each image fits into the RAM that is left: the images have drivers that the one for QEMU has not.
+#[test]
+fn the_stack_fits() {
+    for board in [&STM32F405, &SKR_PRO] {
+        let image = emulated::image(board);
+        let analysis = cycles::graph::analyse(&image).unwrap();
+        assert_eq!(analysis.unresolved, [""; 0], "not followed");
+        let room = cycles::image::sizes(&image).unwrap().stack_room;
+        let needed = u64::from(analysis.stack_bytes());
+        println!("{}: {needed} of {room} bytes of stack", board.id);
+        assert!(needed < room, "{needed} of {room}: {:?}", analysis.contexts);
     }
 }
 

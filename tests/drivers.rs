@@ -146,6 +146,7 @@ fn every_input_is_found_on_its_pin() {
             Role::LimitMax(Axis::Z) => Some("limit switch z+"),
             Role::DriveFault => Some("drive fault"),
             Role::Probe => Some("probe"),
+            Role::Start => Some("start button"),
             _ => None,
         };
         let quiet = |port: Port| {
@@ -173,7 +174,7 @@ fn every_input_is_found_on_its_pin() {
                 found += names.len();
             }
         }
-        assert_eq!(found, 2 * 9, "{}", board.id);
+        assert_eq!(found, 2 * 10, "{}", board.id);
     }
 }
 

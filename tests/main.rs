@@ -44,6 +44,7 @@ mod session;
 mod settings;
 mod spindle;
 mod standing;
+mod stored;
 mod streaming;
 mod swept;
 mod unusual_motion;

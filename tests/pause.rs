@@ -1,6 +1,6 @@
 //! A pause leaves the surface and comes back to the same sample; a run that begins at a pass has the passes of the whole run from there on.
 
-use interp_core::{Command, Inputs, Sample, State};
+use interp_core::{Command, Inputs, RunStart, Sample, SpanParameter, State};
 use job::{AxisLimits, Job, Pattern, Spacing};
 use machine::Machine;
 use machine::prepare::prepare;
@@ -47,10 +47,17 @@ fn jobs() -> Vec<(String, Job)> {
     jobs
 }
 
-/// Samples of a run that begins at a pass.
-fn run_from(job: &Job, pass: u32) -> (Vec<Sample>, AxisLimits) {
+const fn at_pass(pass: u32) -> RunStart {
+    RunStart {
+        pass,
+        path: SpanParameter::NONE,
+    }
+}
+
+/// Samples of a run that begins here.
+fn run_from(job: &Job, start: RunStart) -> (Vec<Sample>, AxisLimits) {
     let mut prepared = prepare(job).unwrap();
-    prepared.first_pass = pass;
+    prepared.start = start;
     let mut machine = Machine::load(&prepared).unwrap();
     let mut samples = Vec::new();
     machine
@@ -83,11 +90,11 @@ fn distance_nm(a: [i32; 3], b: [i32; 3]) -> f64 {
 #[test]
 fn a_run_that_begins_at_a_pass_has_the_same_passes() {
     for (name, job) in jobs() {
-        let (whole, _) = run_from(&job, 0);
+        let (whole, _) = run_from(&job, RunStart::FIRST);
         let all = ends(&whole);
         let last = u32::try_from(all.len()).unwrap() - 1;
         for first in [1, last / 2, last] {
-            let (part, _) = run_from(&job, first);
+            let (part, _) = run_from(&job, at_pass(first));
             let rest = ends(&part);
             assert!(part.iter().all(|sample| sample.pass >= first), "{name} {first}");
             assert_eq!(rest.len(), all.len() - first as usize, "{name} {first}");
@@ -110,7 +117,112 @@ fn a_run_that_begins_at_a_pass_has_the_same_passes() {
         }
         // One that does not exist is a fault, and nothing moves.
         let mut prepared = prepare(&job).unwrap();
-        prepared.first_pass = last + 1;
+        prepared.start = at_pass(last + 1);
+        let mut machine = Machine::load(&prepared).unwrap();
+        let fault = machine.run(|_| true).unwrap_err();
+        assert_eq!(fault.kind, interp_core::FaultKind::WrongState, "{name}");
+    }
+}
+
+/// Distance of a place from the polyline through samples, nm.
+fn beside_nm(path: &[Sample], at: [i32; 3]) -> f64 {
+    let sub = |a: [i32; 3], b: [i32; 3]| [0, 1, 2].map(|axis| f64::from(a[axis]) - f64::from(b[axis]));
+    let dot = |a: [f64; 3], b: [f64; 3]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    path.windows(2)
+        .map(|pair| {
+            let (way, to) = (sub(pair[1].cl_nm, pair[0].cl_nm), sub(at, pair[0].cl_nm));
+            let part = (dot(way, to) / dot(way, way).max(1.0)).clamp(0.0, 1.0);
+            let rest = [0, 1, 2].map(|axis| to[axis] - part * way[axis]);
+            dot(rest, rest).sqrt()
+        })
+        .fold(f64::INFINITY, f64::min)
+}
+
+/// Arc of the contact before each sample of a pass, mm.
+fn arcs_mm(pass: &[Sample]) -> Vec<f64> {
+    let mut arcs = vec![0.0];
+    for pair in pass.windows(2) {
+        let last = *arcs.last().unwrap();
+        arcs.push(last + distance_nm(pair[0].cc_nm, pair[1].cc_nm) * 1e-6);
+    }
+    arcs
+}
+
+#[test]
+fn a_run_that_begins_within_a_pass_goes_on_along_it() {
+    let mut random = Random(11);
+    for (name, job) in jobs() {
+        let (whole, limits) = run_from(&job, RunStart::FIRST);
+        let all = ends(&whole);
+        // Of each pass that is tried, a place anywhere but at its ends.
+        for _ in 0..12 {
+            let number = u32::try_from(random.below(all.len())).unwrap();
+            let on_pass = |sample: &&Sample| sample.pass == number && sample.state == State::Running;
+            let pass: Vec<Sample> = whole.iter().filter(on_pass).copied().collect();
+            let arcs = arcs_mm(&pass);
+            let length = *arcs.last().unwrap();
+            let candidates: Vec<usize> = (0..pass.len())
+                .filter(|at| arcs[*at] > 0.5 && length - arcs[*at] > 0.5)
+                .collect();
+            if candidates.is_empty() {
+                continue;
+            }
+            let at = candidates[random.below(candidates.len())];
+            let start = RunStart {
+                pass: number,
+                path: pass[at].path,
+            };
+            let name = format!("{name}: pass {number}, {:.2} of {length:.2} mm", arcs[at]);
+            let (part, _) = run_from(&job, start);
+            check_limits(&name, &part, &limits);
+            let rest: Vec<Sample> = part.iter().filter(on_pass).copied().collect();
+            // To the sample.
+            let first = Sample {
+                tick: pass[at].tick,
+                feed_mm_s: pass[at].feed_mm_s,
+                ..rest[0]
+            };
+            assert_eq!(first, pass[at], "{name}");
+            // In front of a turn the last sample on a pass lies up to a period's way before its end, and with a rest there the others come closer to it.
+            let end = pass[pass.len() - 1].cl_nm;
+            let is_behind =
+                |sample: &&Sample| job.overrun_mm == 0.0 || distance_nm(sample.cl_nm, end) > 60_000.0;
+            let deepest = rest
+                .iter()
+                .filter(is_behind)
+                .map(|sample| beside_nm(&pass, sample.cl_nm))
+                .fold(0.0, f64::max);
+            // The samples of the whole are joined by chords here: their height, and rounding.
+            let chord = |three: &[Sample]| {
+                let bent = [0, 1, 2].map(|axis| {
+                    let at = |n: usize| f64::from(three[n].cl_nm[axis]);
+                    at(0) - 2.0 * at(1) + at(2)
+                });
+                bent.iter().map(|bent| bent * bent).sum::<f64>().sqrt() / 8.0
+            };
+            let most = 3.0 + pass.windows(3).map(chord).fold(0.0, f64::max);
+            assert!(deepest < most, "{name}: {deepest} nm beside the pass, {most}");
+            let got = ends(&part);
+            let want = &all[number as usize..];
+            assert_eq!(got.len(), want.len(), "{name}");
+            let most = if job.overrun_mm > 0.0 { 60_000.0 } else { 2.0 };
+            for (got, want) in got.iter().zip(want) {
+                let from = usize::from(got[0].pass == number);
+                for (got, want) in got.iter().zip(want).skip(from) {
+                    let apart = distance_nm(got.cl_nm, want.cl_nm);
+                    assert!(apart <= most, "{name}: pass {}, {apart} nm", want.pass);
+                    if !matches!(job.spacing, Spacing::Constant(_)) {
+                        assert_eq!(got.side, want.side, "{name}");
+                    }
+                }
+            }
+        }
+        // A place beside the pass is a fault, and nothing moves.
+        let mut prepared = prepare(&job).unwrap();
+        prepared.start.path = SpanParameter {
+            span: u16::MAX - 1,
+            fraction: 0,
+        };
         let mut machine = Machine::load(&prepared).unwrap();
         let fault = machine.run(|_| true).unwrap_err();
         assert_eq!(fault.kind, interp_core::FaultKind::WrongState, "{name}");
@@ -189,7 +301,7 @@ fn check_limits(name: &str, samples: &[Sample], limits: &AxisLimits) {
 fn a_pause_comes_back_to_the_same_sample() {
     let mut random = Random(7);
     for (name, job) in jobs() {
-        let (whole, limits) = run_from(&job, 0);
+        let (whole, limits) = run_from(&job, RunStart::FIRST);
         let safe_z_nm = prepare(&job).unwrap().header.axes.unwrap().safe_z_nm;
         let places: Vec<usize> = (0..12).map(|_| 1 + random.below(whole.len() - 1)).collect();
         for place in places {
@@ -214,8 +326,7 @@ fn a_pause_comes_back_to_the_same_sample() {
             let away = with_pause.len();
             rest(&mut paused, Command::Resume, &mut with_pause);
             check_limits(&name, &with_pause, &limits);
-            if stood.path == interp_core::SpanParameter::NONE && stood.pass == 0 && stood.cc_nm == stood.cl_nm
-            {
+            if stood.path == SpanParameter::NONE && stood.pass == 0 && stood.cc_nm == stood.cl_nm {
                 // On the way to a pass: it leads there from above.
                 continue;
             }
@@ -234,7 +345,7 @@ fn a_pause_comes_back_to_the_same_sample() {
                 continue;
             };
             let back = away + back;
-            if stood.path != interp_core::SpanParameter::NONE && with_pause[back].state == State::Running {
+            if stood.path != SpanParameter::NONE && with_pause[back].state == State::Running {
                 let shown = Sample {
                     tick: stood.tick,
                     state: stood.state,
@@ -254,7 +365,7 @@ fn a_pause_comes_back_to_the_same_sample() {
                 let on = |sample: &&Sample| sample.pass == stood.pass && sample.state == State::Running;
                 samples.iter().filter(on).copied().collect()
             };
-            if stood.path != interp_core::SpanParameter::NONE && job.overrun_mm == 0.0 {
+            if stood.path != SpanParameter::NONE && job.overrun_mm == 0.0 {
                 let same = path(&on_pass(&with_pause[back..])) == path(&on_pass(&with_hold[from..]));
                 assert!(same, "{name}: the rest of the pass");
             }
@@ -276,7 +387,7 @@ fn a_pause_comes_back_to_the_same_sample() {
 #[test]
 fn the_ways_of_a_pause_obey() {
     let job = sample_job("torus", Pattern::Zigzag, 0.0, None);
-    let (whole, _) = run_from(&job, 0);
+    let (whole, _) = run_from(&job, RunStart::FIRST);
     let at = whole.iter().position(|sample| sample.pass == 1).unwrap() + 300;
     for ends in [Command::Abort, Command::Stop, Command::Pause, Command::Resume] {
         // Held on its way up, and on its way back.

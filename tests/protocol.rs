@@ -10,6 +10,7 @@ use any_message::{any_reply, any_request};
 use controller::link::Link;
 use integration_tests::{HELLO, Mock, frame, is_bad_frame};
 use interp_core::{
+    RunStart,
     job::{AxisLimits, Header, Pattern, Spacing, SurfaceKind, ToolSide},
     sample::{Sample, SpanParameter, State},
     steps::{AxisSteps, StepConfig},
@@ -19,10 +20,10 @@ use protocol::{
     frame::{Decoder, FRAME_MAX, FrameError, write_reply},
     message::{
         Activity, AtSpeed, Batch, Capabilities, Clock, Configuration, Description, DoorContact, Excess,
-        FaultReport, Homing, InputLines, JogWay, Journal, LinkTimeoutAction, MotionEnd, MotionStatus,
-        Offsets, PassDigest, PauseCause, Profile, ProfileLimit, Reason, Reply, Report, Request, ResetCause,
-        SafetyStatus, SampleRecord, SpindleOrder, SpindleSettings, Status, StepSettings, StreamStatus,
-        Turning, Words, read_reply, read_request,
+        FaultReport, Homing, InputLines, JobName, JogWay, Journal, LinkTimeoutAction, MotionEnd,
+        MotionStatus, Offsets, PassDigest, PauseCause, Profile, ProfileLimit, Reason, Reply, Report, Request,
+        ResetCause, SafetyStatus, SampleRecord, SpindleOrder, SpindleSettings, Status, StepSettings,
+        StoredJobInfo, StreamStatus, Turning, Words, read_reply, read_request,
     },
 };
 
@@ -169,13 +170,31 @@ fn requests() -> Vec<Request> {
             coolant: true,
         }),
         Request::Pause,
-        Request::StartAt { pass: 300 },
+        Request::StartAt(RunStart {
+            pass: 300,
+            path: SpanParameter {
+                span: 7,
+                fraction: 1 << 63,
+            },
+        }),
         Request::Journal,
         Request::Turn {
             turning: Turning::Clockwise,
             rpm: 300,
         },
         Request::Coolant { on: true },
+        Request::StoreJob {
+            name: JobName::try_from("left").unwrap(),
+            begins_anywhere: true,
+        },
+        Request::DeleteJob {
+            name: JobName::try_from("left").unwrap(),
+        },
+        Request::StoredJob { index: 7 },
+        Request::StartJob {
+            name: JobName::try_from("left").unwrap(),
+            resumes: true,
+        },
         Request::JobBegin {
             header: Header {
                 axes: Some(axes()),
@@ -341,6 +360,9 @@ fn reasons() -> Vec<Reason> {
         Reason::WholeOnly,
         Reason::SpindleTurns,
         Reason::NoFeed,
+        Reason::NoStoredJob,
+        Reason::NoRoom { words: 300 },
+        Reason::NothingToResume,
     ]
 }
 
@@ -424,7 +446,20 @@ fn replies() -> Vec<Reply> {
                 profile: 0x9abc_def0,
                 pass: 300,
                 is_finished: true,
+                path: SpanParameter {
+                    span: 300,
+                    fraction: 0x0123_4567_89ab_cdef,
+                },
             }),
+        },
+        Reply::StoredJob {
+            number: 9,
+            job: Some(StoredJobInfo {
+                name: JobName::try_from("left").unwrap(),
+                words: 300,
+                mark: 0x0123_4567_89ab_cdef,
+            }),
+            room: 20_000,
         },
     ]);
     replies

@@ -219,6 +219,8 @@ pub enum Role {
     Door,
     /// Input: active when the spindle is at speed.
     AtSpeed,
+    /// Input: active while the start button is pressed. It closes, so that a broken wire starts nothing.
+    Start,
     /// Output: active while the spindle turns.
     SpindleEnable,
     /// Output: active while it turns counterclockwise.
@@ -259,6 +261,7 @@ impl Role {
             Self::Coolant => 25,
             Self::Door => 26,
             Self::AtSpeed => 27,
+            Self::Start => 28,
         }
     }
 
@@ -274,6 +277,7 @@ impl Role {
                 | Self::Probe
                 | Self::Door
                 | Self::AtSpeed
+                | Self::Start
                 | Self::SerialRx
         )
     }
@@ -292,6 +296,7 @@ impl core::fmt::Display for Role {
             Self::Probe => f.write_str("probe"),
             Self::Door => f.write_str("safety door"),
             Self::AtSpeed => f.write_str("spindle at speed"),
+            Self::Start => f.write_str("start button"),
             Self::SpindleEnable => f.write_str("spindle"),
             Self::SpindleDirection => f.write_str("spindle, counterclockwise"),
             Self::SpindleSpeed => f.write_str("spindle speed (PWM)"),

@@ -11,6 +11,7 @@
 //! - Emergency stop and drive fault are on the header EXTENSION-1, which nothing else uses: PC9 is next to ground, so that a
 //!   two-pole plug fits. The header has no filter; the chip's pull-up (40 kOhm) holds the line.
 //! - Probe, safety door and the spindle's contact are on EXP1, whose pin 2 is ground: their port is one that each tick reads anyway.
+//! - The start button is on EXP2, whose pin 2 is ground, on the same port.
 //! - The spindle is on EXP1 and EXP2, 3.3 V: enable and direction, and PB15 as the only free output of a timer that nothing else uses. FAN0 switches the coolant.
 //! - USART1 is on the TFT socket, at 3.3 V. USB goes to the OTG port, which this firmware does not use.
 //! - The LED D13 is connected to PA7 through 1 kOhm and is lit while the pin is high.
@@ -27,7 +28,7 @@ use crate::{
     Port::{A, B, C, D, E, F, G},
     Role::{
         AtSpeed, Coolant, Direction, Door, DriveFault, EmergencyStop, Enable, LimitMax, LimitMin, Parked,
-        Probe, SerialRx, SerialTx, SpindleDirection, SpindleEnable, SpindleSpeed, StatusLed, Step,
+        Probe, SerialRx, SerialTx, SpindleDirection, SpindleEnable, SpindleSpeed, Start, StatusLed, Step,
     },
 };
 
@@ -71,6 +72,7 @@ pub const SKR_PRO: Board = Board {
         Line::new(Probe, G, 2, High, "EXP1, pin 6"),
         Line::new(Door, G, 7, High, "EXP1, pin 3"),
         Line::new(AtSpeed, G, 4, Low, "EXP1, pin 10"),
+        Line::new(Start, G, 10, Low, "EXP2, pin 8"),
         Line::new(SpindleEnable, G, 3, High, "EXP1, pin 5"),
         Line::new(SpindleDirection, G, 6, High, "EXP1, pin 4"),
         Line::new(SpindleSpeed, B, 15, High, "EXP2, pin 5"),

@@ -12,7 +12,7 @@ use crate::{
     Port::{A, B, C},
     Role::{
         AtSpeed, Coolant, Direction, Door, DriveFault, EmergencyStop, Enable, LimitMax, LimitMin, Probe,
-        SerialRx, SerialTx, SpindleDirection, SpindleEnable, SpindleSpeed, StatusLed, Step,
+        SerialRx, SerialTx, SpindleDirection, SpindleEnable, SpindleSpeed, Start, StatusLed, Step,
     },
 };
 
@@ -53,6 +53,7 @@ pub const STM32F405: Board = Board {
         Line::new(Probe, C, 4, High, "the pin"),
         Line::new(Door, C, 5, High, "the pin"),
         Line::new(AtSpeed, B, 0, Low, "the pin"),
+        Line::new(Start, B, 1, Low, "the pin"),
         Line::new(SpindleEnable, C, 9, High, "the pin"),
         Line::new(SpindleDirection, C, 10, High, "the pin"),
         Line::new(SpindleSpeed, B, 15, High, "the pin"),

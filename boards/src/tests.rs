@@ -39,6 +39,7 @@ fn roles() -> Vec<Role> {
         Role::Probe,
         Role::Door,
         Role::AtSpeed,
+        Role::Start,
         Role::SpindleEnable,
         Role::SpindleDirection,
         Role::SpindleSpeed,
@@ -101,10 +102,10 @@ fn steps_are_on_one_port() {
 #[test]
 fn inputs_fail_to_the_safe_side() {
     for board in BOARDS {
-        assert_eq!(inputs(board).count(), 11);
+        assert_eq!(inputs(board).count(), 12);
         for line in inputs(board) {
-            // An open circuit pulls the pin up: a stop, an open door, a touch, and no speed.
-            let is_safe = line.role != Role::AtSpeed;
+            // An open circuit pulls the pin up: a stop, an open door, a touch, no speed, and no start.
+            let is_safe = !matches!(line.role, Role::AtSpeed | Role::Start);
             assert_eq!(line.active == Level::High, is_safe, "{}: {}", board.id, line.role);
             assert_eq!(line.is_active(line.pin.bit()), is_safe);
             assert_eq!(line.is_active(!line.pin.bit()), !is_safe);

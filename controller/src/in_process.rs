@@ -3,7 +3,9 @@
 use std::collections::VecDeque;
 use std::vec::Vec;
 
+use embedded_storage::nor_flash::NorFlash;
 use interp_core::{
+    RunStart,
     fault::Fault,
     job::{Header, STORE_WORDS, stream::RecordCopy},
     steps::{BUFFER_WORDS, CheckedSteps, StepConfig},
@@ -11,13 +13,14 @@ use interp_core::{
 use protocol::message::{Description, InputLines, Journal, MotionStatus, Offsets, Profile, Reason, Status};
 
 use crate::{
+    jobs::JobStore,
     link::Link,
     machine::{Busy, Event, Events, Instruction, Machine, describe},
     ram_flash::RamFlash,
     realtime::{RealTime, TickInput},
     safety::Order,
     settings::Settings,
-    storage::{JOURNAL_SLOT, Kind, Storage, StorageError},
+    storage::{Prepared, StorageError},
 };
 
 /// Capacity of the instruction queue, as in the firmware.
@@ -42,11 +45,14 @@ struct Half<const WORDS: usize> {
     commands: VecDeque<Instruction>,
     lines: InputLines,
     settings: Settings<RamFlash<SECTOR>>,
-    journal: Storage<RamFlash<SECTOR>, JOURNAL_SLOT>,
+    prepared: Option<Prepared>,
+    jobs: JobStore<RamFlash<JOB_SECTOR>>,
 }
 
 /// Bytes of a sector of the board's flash.
-const SECTOR: usize = 4096;
+const SECTOR: usize = 16 * 1024;
+/// The same of that for jobs.
+const JOB_SECTOR: usize = 32 * 1024;
 
 impl<const WORDS: usize> Machine for Half<WORDS> {
     fn description(&mut self) -> Description {
@@ -110,12 +116,34 @@ impl<const WORDS: usize> Machine for Half<WORDS> {
     }
 
     fn journal(&mut self) -> Option<Journal> {
-        let newest = self.journal.newest(Kind::Journal)?;
-        Journal::read(newest.bytes())
+        self.settings.journal()
     }
 
     fn keep_journal(&mut self, journal: &Journal) -> Result<(), StorageError> {
-        self.journal.keep(Kind::Journal, &journal.write())
+        self.settings.keep_journal(journal)
+    }
+
+    fn prepare_journal(&mut self, journal: Option<&Journal>) {
+        self.prepared = self.settings.prepare_journal(journal, false);
+    }
+
+    type JobFlash = RamFlash<JOB_SECTOR>;
+
+    fn jobs(&mut self) -> &mut JobStore<Self::JobFlash> {
+        &mut self.jobs
+    }
+
+    fn loaded(&mut self) -> Option<(Header, u32)> {
+        let (header, words) = self.real_time.loaded()?;
+        Some((*header, u32::try_from(words.len()).ok()?))
+    }
+
+    fn loaded_words(&mut self, offset: u32, words: &mut [i32]) -> usize {
+        self.real_time.loaded_words(offset, words)
+    }
+
+    fn place(&mut self) -> Option<RunStart> {
+        self.real_time.place()
     }
 
     fn own_steps(&mut self) -> StepConfig {
@@ -168,7 +196,7 @@ pub struct Board<const WORDS: usize = STORE_WORDS> {
 
 impl<const WORDS: usize> Default for Board<WORDS> {
     fn default() -> Self {
-        Self::with_flash([RamFlash::new(), RamFlash::new()])
+        Self::with_flash(RamFlash::new(), RamFlash::new())
     }
 }
 
@@ -180,13 +208,14 @@ impl<const WORDS: usize> Board<WORDS> {
     }
 
     /// A board after power-up, with what its flash has.
-    fn with_flash([settings, journal]: [RamFlash<SECTOR>; 2]) -> Self {
+    fn with_flash(settings: RamFlash<SECTOR>, jobs: RamFlash<JOB_SECTOR>) -> Self {
         let mut half = Half {
             real_time: RealTime::default(),
             commands: VecDeque::new(),
             lines: InputLines::NONE,
             settings: Settings::open(settings),
-            journal: Storage::open(journal),
+            prepared: None,
+            jobs: JobStore::open(jobs),
         };
         let mut link = Link::new();
         link.power_up(&mut half);
@@ -202,7 +231,19 @@ impl<const WORDS: usize> Board<WORDS> {
     /// Cuts the power, and restores it.
     #[must_use]
     pub fn power_cycle(self) -> Self {
-        Self::with_flash([self.half.settings.into_flash(), self.half.journal.into_flash()])
+        Self::with_flash(self.half.settings.into_flash(), self.half.jobs.into_flash())
+    }
+
+    /// The same, with a supply that lasts for the record of its falling.
+    #[must_use]
+    pub fn power_cycle_slowly(self) -> Self {
+        let prepared = self.half.prepared;
+        let mut settings = self.half.settings.into_flash();
+        if let Some(Prepared { offset, bytes }) = prepared {
+            // In RAM; it is within the sectors.
+            let _ = settings.write(offset, &bytes);
+        }
+        Self::with_flash(settings, self.half.jobs.into_flash())
     }
 
     /// Receives bytes from the host.

@@ -30,6 +30,7 @@ extern crate std;
 mod history;
 #[cfg(any(test, feature = "std"))]
 pub mod in_process;
+pub mod jobs;
 mod journal;
 pub mod link;
 pub mod machine;

@@ -101,9 +101,10 @@ impl Link {
         }
     }
 
-    /// Journals what of a run is due. To be called once a period or more often; `now`: periods since power-up.
+    /// Journals what of a run is due, and looks at the start button. To be called once a period or more often; `now`: periods since power-up.
     pub fn keep_journal(&mut self, now: u32, machine: &mut impl Machine) {
         self.session.keep_journal(now, machine);
+        self.session.watch_button(now, machine);
     }
 
     /// Adds a sample, and writes the frame once it is full.

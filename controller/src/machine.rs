@@ -1,6 +1,8 @@
 //! The interface between the link and the real-time half of the board.
 
+use embedded_storage::nor_flash::NorFlash;
 use interp_core::{
+    RunStart,
     command::Command,
     fault::Fault,
     job::{Header, SurfaceKind, patches_max, stream::RecordCopy},
@@ -11,7 +13,7 @@ use protocol::message::{
     Reason, Report, Status,
 };
 
-use crate::{safety::Order, storage::StorageError};
+use crate::{jobs::JobStore, safety::Order, storage::StorageError};
 
 /// Instructions from the link to the real-time half; executed with the next tick of the sample timer, in order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -156,11 +158,29 @@ pub trait Machine {
     /// How far the last run came; none where none was journalled. Takes some milliseconds.
     fn journal(&mut self) -> Option<Journal>;
 
-    /// Journals how far a run came. Takes half a millisecond, in which a tick is delayed by 16 us, 100 at most.
+    /// Journals how far a run came. Takes 0.2 ms, in which a tick is delayed by 16 us, 100 at most.
     ///
     /// # Errors
     /// The storage cannot be written, or is full until the next power-up.
     fn keep_journal(&mut self, journal: &Journal) -> Result<(), StorageError>;
+
+    /// Has this record written when the supply falls, at once and without further ado; none: none is. After each [`Self::keep_journal`] it is to be given again.
+    fn prepare_journal(&mut self, journal: Option<&Journal>);
+
+    /// [`crate::realtime::RealTime::place`].
+    fn place(&mut self) -> Option<RunStart>;
+
+    /// Where jobs are kept.
+    type JobFlash: NorFlash;
+
+    /// The jobs that the board keeps.
+    fn jobs(&mut self) -> &mut JobStore<Self::JobFlash>;
+
+    /// Header and number of words of the loaded job; none where none is loaded, or it is streamed.
+    fn loaded(&mut self) -> Option<(Header, u32)>;
+
+    /// Copies words of the loaded job from an offset on; returns their number.
+    fn loaded_words(&mut self, offset: u32, words: &mut [i32]) -> usize;
 
     /// The board's own settings of the drives: those of a job that has none, on a board without a profile.
     fn own_steps(&mut self) -> StepConfig;

@@ -5,7 +5,7 @@ use core::convert::Infallible;
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
 
 /// Two sectors of this number of bytes, erased at first.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct RamFlash<const SECTOR: usize> {
     sectors: [[u8; SECTOR]; 2],
 }

@@ -23,7 +23,7 @@ use interp_core::{
     fault::{Fault, FaultKind, Result},
     interpolator::Interpolator,
     job::{Header, STORE_WORDS, stream::RecordCopy},
-    sample::{Sample, State},
+    sample::{RunStart, Sample, State},
     steps::{BUFFER_WORDS, CheckedSteps, Steps},
 };
 use protocol::message::{
@@ -48,6 +48,17 @@ pub struct TickInput {
     pub cycles: u32,
     /// The present safety inputs.
     pub lines: InputLines,
+}
+
+/// Copies words from an offset on; returns their number.
+pub(crate) fn copy_words(from: &[i32], offset: u32, to: &mut [i32]) -> usize {
+    let from = from.get(offset as usize..).unwrap_or(&[]);
+    let mut count = 0;
+    for (to, from) in to.iter_mut().zip(from) {
+        *to = *from;
+        count += 1;
+    }
+    count
 }
 
 /// Whether the tool moves, so that each sample belongs to the run.
@@ -513,6 +524,24 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
     #[inline]
     pub const fn feeds_watchdog(&self, missed: u32, cycles: u32) -> bool {
         missed == 0 && cycles <= self.control.tick_budget
+    }
+
+    /// [`Interpolator::loaded`].
+    #[must_use]
+    pub fn loaded(&self) -> Option<(&Header, &[i32])> {
+        self.interpolator.loaded()
+    }
+
+    /// Copies words of the loaded job from an offset on; returns their number.
+    pub fn loaded_words(&self, offset: u32, words: &mut [i32]) -> usize {
+        let loaded = self.loaded().map_or(&[][..], |(_, loaded)| loaded);
+        copy_words(loaded, offset, words)
+    }
+
+    /// [`Interpolator::place`].
+    #[must_use]
+    pub fn place(&self) -> Option<RunStart> {
+        self.interpolator.place()
     }
 
     /// The last sample.

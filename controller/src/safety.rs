@@ -21,7 +21,7 @@
 use crate::manual::{HEARD_TICKS, Motion, Setup};
 use interp_core::{
     fault::{Fault, FaultKind},
-    sample::State,
+    sample::{RunStart, State},
 };
 use protocol::message::{
     Clock, Configuration, InputLines, LinkTimeoutAction, OVERRIDE_MAX_PERCENT, PauseCause, Reason,
@@ -60,8 +60,8 @@ pub enum Order {
         /// Whether to switch it on.
         on: bool,
     },
-    /// The pass with which the next run begins.
-    BeginAt(u32),
+    /// Where the next run begins.
+    BeginAt(RunStart),
     /// Configuration of the machine.
     Configure(Configuration),
     /// Drives on or off.

@@ -1,5 +1,6 @@
 //! A session with the host: its version, the numbers of its requests, and their answers.
 
+mod jobs;
 mod journalled;
 mod kept;
 mod last;
@@ -8,11 +9,14 @@ mod requests;
 use interp_core::steps::StepConfig;
 use protocol::{
     frame::{DELIMITER, FRAME_MAX, Frame, write_reply},
-    message::{Capabilities, Clock, Reason, Reply, Request, Status, StepSettings, next_number, read_request},
+    message::{
+        Capabilities, Clock, Reason, Reply, Request, SpindleOrder, Status, StepSettings, next_number,
+        read_request,
+    },
     version::PROTOCOL_VERSION,
 };
 
-use self::{kept::own_steps, last::Last};
+use self::{jobs::Button, kept::own_steps, last::Last};
 use crate::{history::History, journal::Journalling, machine::Machine, upload::Upload};
 
 /// State of the session.
@@ -49,6 +53,9 @@ pub(crate) struct Session {
     /// [`job_mark`] of the job whose runs are journalled; none where the loaded one's are not.
     job: Option<u64>,
     journalling: Journalling,
+    /// Spindle and coolant of the loaded job.
+    spindle: SpindleOrder,
+    button: Button,
 }
 
 impl Session {
@@ -66,6 +73,8 @@ impl Session {
             is_outdated: false,
             job: None,
             journalling: Journalling::NONE,
+            spindle: SpindleOrder::OFF,
+            button: Button::NONE,
         }
     }
 
@@ -146,6 +155,7 @@ impl Session {
         if let Ok((_, request)) = &read {
             let answer = self.answer(number, request, machine, out);
             self.last.set(number, &frame, &answer);
+            self.button.runs_alone = false;
             out(&self.last.answer);
             true
         } else {

@@ -1,9 +1,9 @@
-//! The machine's profile, work offsets and tool length, kept beyond a power cut.
+//! The machine's profile, work offsets, tool length and the journal, kept beyond a power cut.
 
 use embedded_storage::nor_flash::NorFlash;
-use protocol::message::{OFFSETS_BYTES_MAX, Offsets, PROFILE_BYTES_MAX, Profile};
+use protocol::message::{Journal, OFFSETS_BYTES_MAX, Offsets, PROFILE_BYTES_MAX, Profile};
 
-use crate::storage::{Kind, Storage, StorageError};
+use crate::storage::{Kind, Prepared, Storage, StorageError};
 
 /// The profile, and where it is kept.
 #[derive(Debug)]
@@ -68,5 +68,27 @@ impl<F: NorFlash> Settings<F> {
         self.storage.keep(Kind::Profile, payload)?;
         self.profile = profile.copied();
         Ok(())
+    }
+
+    /// How far the last run came; none where none was journalled.
+    pub fn journal(&mut self) -> Option<Journal> {
+        let newest = self.storage.newest(Kind::Journal)?;
+        Journal::read(newest.bytes())
+    }
+
+    /// Journals how far a run came.
+    ///
+    /// # Errors
+    /// The flash cannot be written, or is full until the next power-up.
+    pub fn keep_journal(&mut self, journal: &Journal) -> Result<(), StorageError> {
+        self.storage.keep(Kind::Journal, &journal.write())
+    }
+
+    /// A record of the journal for [`Storage::prepare`]. `was_written`: the one before was.
+    pub fn prepare_journal(&mut self, journal: Option<&Journal>, was_written: bool) -> Option<Prepared> {
+        if was_written {
+            self.storage.look_again();
+        }
+        self.storage.prepare(Kind::Journal, &journal?.write())
     }
 }

@@ -1,32 +1,41 @@
 //! Records in flash that survive a power cut at any instant.
 //!
-//! Two sectors, each divided into slots, of [`SLOT`] bytes for settings and [`JOURNAL_SLOT`] for a journal. A record is appended to the active sector: sequence number, kind, payload, then a CRC-32;
+//! Two sectors, each divided into slots of [`SLOT`] bytes; a record takes as many of them as it needs. It is appended to the active sector: sequence number, kind, payload, then a CRC-32;
 //! one that was not written to its end does not count. The active sector is that of the newest record. When it is full the other one goes on, with a
 //! copy of what is in force. **An erase stops the processor for seconds**, so it happens at power-up only ([`Storage::open`]): then the spare sector is erased,
 //! and a record in the active one says so. Without that record it is erased again, because an erase that was cut short may leave bits that read differently
 //! every time.
 //!
-//! | slot byte | |
+//! | byte | |
 //! |---|---|
 //! | 0 to 3 | sequence number, low byte first |
 //! | 4, 5 | kind, length of the payload |
 //! | 6, 7 | 0xff |
 //! | 8 .. | payload |
-//! | last four | CRC-32 of the bytes before, low byte first |
+//! | last four of the last slot | CRC-32 of the bytes before, low byte first |
 
 use embedded_storage::nor_flash::NorFlash;
 use protocol::frame::crc32;
 
-/// Bytes of a slot of settings.
-pub const SLOT: usize = 256;
-/// Bytes of a slot of a journal: 4096 in a sector of 128 KB.
-pub const JOURNAL_SLOT: usize = 32;
+/// Bytes of a slot: what a record of the journal takes, 3276 in a sector of 128 KB.
+pub const SLOT: usize = 40;
 
 /// Bytes before the payload, and longest payload.
 const HEAD: usize = 8;
 const CRC: usize = 4;
-/// Longest payload of a record of settings, bytes.
-pub const PAYLOAD_MAX: usize = SLOT - HEAD - CRC;
+/// Most slots of a record, and its bytes then.
+const SLOTS_MAX: usize = 6;
+const RECORD_MAX: usize = SLOTS_MAX * SLOT;
+/// Longest payload of a record, bytes.
+pub const PAYLOAD_MAX: usize = RECORD_MAX - HEAD - CRC;
+
+/// Slots of a record with a payload of this length.
+const fn slots_of(payload: usize) -> usize {
+    (HEAD + payload + CRC).div_ceil(SLOT)
+}
+
+/// Blank slots behind which there is no record: one is left blank by a record that was prepared.
+const BLANK_SLOTS: u32 = 4;
 
 /// The value of erased flash.
 const BLANK: u8 = 0xff;
@@ -56,29 +65,37 @@ pub struct StorageError;
 
 /// The payload of the newest record of a kind.
 #[derive(Clone, Copy, Debug)]
-pub struct Payload<const SLOT: usize = 256> {
-    bytes: [u8; SLOT],
+pub struct Payload {
+    bytes: [u8; PAYLOAD_MAX],
     length: usize,
 }
 
-impl<const SLOT: usize> Payload<SLOT> {
+impl Payload {
     /// Its bytes.
     #[must_use]
     pub fn bytes(&self) -> &[u8] {
-        self.bytes.get(HEAD..HEAD + self.length).unwrap_or(&[])
+        self.bytes.get(..self.length).unwrap_or(&[])
     }
 }
 
+/// A record of one slot that is not written yet, and where it will be.
+#[derive(Clone, Copy, Debug)]
+pub struct Prepared {
+    /// Offset of its slot.
+    pub offset: u32,
+    /// All bytes of the slot.
+    pub bytes: [u8; SLOT],
+}
+
 /// A slot's content.
-#[allow(clippy::large_enum_variant, reason = "there is no allocator to box with")]
-enum Content<const SLOT: usize> {
+enum Content {
     Blank,
     /// Neither blank nor a record: its writing was cut short.
     Broken,
     Record {
         sequence: u32,
         kind: u8,
-        payload: Payload<SLOT>,
+        length: u8,
     },
 }
 
@@ -97,15 +114,15 @@ struct Active {
 
 /// Records in two sectors of a flash of `2 * F::ERASE_SIZE` bytes, in which single bytes can be written.
 #[derive(Debug)]
-pub struct Storage<F, const SLOT: usize = 256> {
+pub struct Storage<F> {
     flash: F,
     active: Active,
 }
 
-impl<F: NorFlash, const SLOT: usize> Storage<F, SLOT> {
+impl<F: NorFlash> Storage<F> {
     const SLOTS: u32 = (F::ERASE_SIZE / SLOT) as u32;
-    /// Longest payload, bytes.
-    const PAYLOAD_MAX: usize = SLOT - HEAD - CRC;
+    /// Bytes of a sector.
+    const SECTOR: u32 = F::ERASE_SIZE as u32;
 
     /// Finds the records; erases the spare sector if it is not known to be erased, which takes up to some seconds.
     pub fn open(flash: F) -> Self {
@@ -118,7 +135,11 @@ impl<F: NorFlash, const SLOT: usize> Storage<F, SLOT> {
                 has_spare: false,
             },
         };
-        let [first, second] = [storage.look(0), storage.look(1)];
+        let [mut first, mut second] = [0, 1].map(|sector| storage.look(sector, BLANK_SLOTS));
+        if first.sequence == 0 && second.sequence == 0 {
+            // Nothing is known of them: each slot is looked at.
+            [first, second] = [0, 1].map(|sector| storage.look(sector, Self::SLOTS));
+        }
         let (active, other) = if second.sequence > first.sequence {
             (second, first)
         } else {
@@ -154,7 +175,8 @@ impl<F: NorFlash, const SLOT: usize> Storage<F, SLOT> {
         for kind in Kind::KEPT {
             let newest = |storage: &mut Self, sector| storage.newest_in(sector, kind);
             let there = newest(self, 1 - self.active.sector);
-            if let (None, Some((_, payload))) = (newest(self, self.active.sector), there) {
+            if let (None, Some(place)) = (newest(self, self.active.sector), there) {
+                let payload = self.payload(1 - self.active.sector, place).ok_or(StorageError)?;
                 self.append(kind, payload.bytes())?;
             }
         }
@@ -162,30 +184,52 @@ impl<F: NorFlash, const SLOT: usize> Storage<F, SLOT> {
     }
 
     /// The payload of the newest record of a kind, if there is one.
-    pub fn newest(&mut self, kind: Kind) -> Option<Payload<SLOT>> {
+    pub fn newest(&mut self, kind: Kind) -> Option<Payload> {
         let active = self.active.sector;
-        let found = self
-            .newest_in(active, kind)
-            .or_else(|| self.newest_in(1 - active, kind));
-        found.map(|(_, payload)| payload)
+        for sector in [active, 1 - active] {
+            if let Some(place) = self.newest_in(sector, kind) {
+                return self.payload(sector, place);
+            }
+        }
+        None
     }
 
-    /// The newest record of a kind in a sector, with its sequence number.
-    fn newest_in(&mut self, sector: u32, kind: Kind) -> Option<(u32, Payload<SLOT>)> {
-        let mut newest: Option<(u32, Payload<SLOT>)> = None;
-        for slot in 0..Self::SLOTS {
+    /// Slot and length of the newest record of a kind in a sector.
+    #[inline(never)]
+    fn newest_in(&mut self, sector: u32, kind: Kind) -> Option<(u32, u8)> {
+        let mut newest = None;
+        let mut newest_sequence = 0;
+        let (mut slot, mut blank) = (0, 0);
+        while slot < Self::SLOTS && blank < BLANK_SLOTS {
+            let content = self.slot(sector, slot);
+            blank = content.blank_after(blank);
             if let Content::Record {
                 sequence,
                 kind: found,
-                payload,
-            } = self.slot(sector, slot)
+                length,
+            } = content
                 && found == kind as u8
-                && newest.as_ref().is_none_or(|(before, _)| sequence > *before)
+                && sequence > newest_sequence
             {
-                newest = Some((sequence, payload));
+                (newest, newest_sequence) = (Some((slot, length)), sequence);
             }
+            slot += content.slots();
         }
         newest
+    }
+
+    /// The payload of a record.
+    #[inline(never)]
+    fn payload(&mut self, sector: u32, (slot, length): (u32, u8)) -> Option<Payload> {
+        let mut payload = Payload {
+            bytes: [0; PAYLOAD_MAX],
+            length: length.into(),
+        };
+        let place = payload.bytes.get_mut(..payload.length)?;
+        self.flash
+            .read(Self::offset(sector, slot) + HEAD as u32, place)
+            .ok()?;
+        Some(payload)
     }
 
     /// Keeps a record of a kind in place of the one before.
@@ -193,7 +237,7 @@ impl<F: NorFlash, const SLOT: usize> Storage<F, SLOT> {
     /// # Errors
     /// The payload is longer than a slot has room for, the flash fails, or it is full until the next power-up.
     pub fn keep(&mut self, kind: Kind, payload: &[u8]) -> Result<(), StorageError> {
-        if self.active.next >= Self::SLOTS {
+        if self.active.next + slots_of(payload.len()) as u32 > Self::SLOTS {
             self.swap()?;
         }
         self.append(kind, payload)
@@ -213,35 +257,60 @@ impl<F: NorFlash, const SLOT: usize> Storage<F, SLOT> {
         Ok(())
     }
 
-    /// Writes a record into the next slot, and reads it back.
+    /// A record for the slot behind the next one, so that it does not meet a record that is being written: it counts as soon as its bytes are there, until the next record.
+    /// None where there is no room. Whoever has written it calls [`Self::look_again`].
+    pub fn prepare(&self, kind: Kind, payload: &[u8]) -> Option<Prepared> {
+        let Active {
+            sector,
+            next,
+            sequence,
+            has_spare,
+        } = self.active;
+        let after = next + 1;
+        let (sector, slot) = match after.checked_sub(Self::SLOTS) {
+            None => (sector, after),
+            Some(beyond) if has_spare => (1 - sector, beyond),
+            Some(_) => return None,
+        };
+        let record = Record::new(sequence.checked_add(2)?, kind, payload)?;
+        Some(Prepared {
+            offset: Self::offset(sector, slot),
+            bytes: *record.bytes.first_chunk().filter(|_| record.slots == 1)?,
+        })
+    }
+
+    /// Finds the newest record anew: one was written that was prepared.
+    pub fn look_again(&mut self) {
+        let [first, second] = [0, 1].map(|sector| self.look(sector, BLANK_SLOTS));
+        self.active = if second.sequence > first.sequence {
+            second
+        } else {
+            first
+        };
+    }
+
+    /// Writes a record into the next slots, and reads it back.
     fn append(&mut self, kind: Kind, payload: &[u8]) -> Result<(), StorageError> {
-        if self.active.next >= Self::SLOTS {
+        let sequence = self.active.sequence.checked_add(1).ok_or(StorageError)?;
+        let record = Record::new(sequence, kind, payload).ok_or(StorageError)?;
+        if self.active.next + record.slots > Self::SLOTS {
             return Err(StorageError);
         }
-        let sequence = self.active.sequence.checked_add(1).ok_or(StorageError)?;
-        let mut bytes = [BLANK; SLOT];
-        let length = u8::try_from(payload.len()).map_err(|_| StorageError)?;
-        let (data, crc) = bytes.split_at_mut(SLOT - CRC);
-        let (head, place) = data.split_at_mut(HEAD);
-        let place = place.get_mut(..payload.len()).ok_or(StorageError)?;
-        place.copy_from_slice(payload);
-        for (to, from) in head
-            .iter_mut()
-            .zip(sequence.to_le_bytes().into_iter().chain([kind as u8, length]))
-        {
-            *to = from;
-        }
-        crc.copy_from_slice(&crc32(data).to_le_bytes());
-        let offset = self.offset(self.active.sector, self.active.next);
-        // Whatever happens, the slot is not blank any more.
-        self.active.next += 1;
-        let (data, crc) = bytes.split_at(SLOT - CRC);
-        let written = data.get(..HEAD + payload.len()).unwrap_or(data);
+        let offset = Self::offset(self.active.sector, self.active.next);
+        // Whatever happens, the slots are not blank any more.
+        self.active.next += record.slots;
+        let bytes = record.bytes();
+        let (data, crc) = bytes.split_at(bytes.len() - CRC);
+        // To whole words, which a driver may write as such.
+        let written = data
+            .get(..(HEAD + payload.len()).next_multiple_of(CRC))
+            .unwrap_or(data);
         self.flash.write(offset, written).map_err(|_| StorageError)?;
-        let last = offset + (SLOT - CRC) as u32;
+        let last = offset + data.len() as u32;
         self.flash.write(last, crc).map_err(|_| StorageError)?;
-        let mut again = [0; SLOT];
-        self.flash.read(offset, &mut again).map_err(|_| StorageError)?;
+        let mut again = [0; RECORD_MAX];
+        let again = again.get_mut(..bytes.len()).ok_or(StorageError)?;
+        self.flash.read(offset, again).map_err(|_| StorageError)?;
         if again != bytes {
             return Err(StorageError);
         }
@@ -250,65 +319,130 @@ impl<F: NorFlash, const SLOT: usize> Storage<F, SLOT> {
     }
 
     fn erase(&mut self, sector: u32) -> Result<(), StorageError> {
-        let (from, to) = (self.offset(sector, 0), self.offset(sector, Self::SLOTS));
+        let (from, to) = (sector * Self::SECTOR, (sector + 1) * Self::SECTOR);
         self.flash.erase(from, to).map_err(|_| StorageError)
     }
 
-    fn offset(&self, sector: u32, slot: u32) -> u32 {
-        (sector * Self::SLOTS + slot) * SLOT as u32
+    const fn offset(sector: u32, slot: u32) -> u32 {
+        sector * Self::SECTOR + slot * SLOT as u32
     }
 
-    fn slot(&mut self, sector: u32, slot: u32) -> Content<SLOT> {
+    /// The content of a slot, and of those behind it that belong to it.
+    fn slot(&mut self, sector: u32, slot: u32) -> Content {
         // Most slots are blank: a look at their head is enough, because it is written first.
         let mut head = [0; HEAD];
-        let mut bytes = [0; SLOT];
-        let offset = self.offset(sector, slot);
+        let offset = Self::offset(sector, slot);
         if self.flash.read(offset, &mut head).is_err() {
             return Content::Broken;
         }
         if head == [BLANK; HEAD] {
             return Content::Blank;
         }
-        if self.flash.read(offset, &mut bytes).is_err() {
+        self.record(slot, offset, head)
+    }
+
+    /// The content of a slot that begins with this head.
+    #[inline(never)]
+    fn record(&mut self, slot: u32, offset: u32, head: [u8; HEAD]) -> Content {
+        let mut bytes = [BLANK; RECORD_MAX];
+        let [a, b, c, d, kind, length, ..] = head;
+        let slots = slots_of(length.into());
+        if slots > SLOTS_MAX || slot + slots as u32 > Self::SLOTS {
             return Content::Broken;
         }
-        let (data, crc) = bytes.split_at(SLOT - CRC);
-        let [a, b, c, d, kind, length, ..] = *data else {
+        let Some(whole) = bytes.get_mut(..slots * SLOT) else {
             return Content::Broken;
         };
-        if crc32(data).to_le_bytes() != *crc || usize::from(length) > Self::PAYLOAD_MAX {
+        if self.flash.read(offset, whole).is_err() {
+            return Content::Broken;
+        }
+        let (data, crc) = whole.split_at(whole.len() - CRC);
+        if crc32(data).to_le_bytes() != *crc {
             return Content::Broken;
         }
         Content::Record {
             sequence: u32::from_le_bytes([a, b, c, d]),
             kind,
-            payload: Payload {
-                bytes,
-                length: length.into(),
-            },
+            length,
         }
     }
 
-    /// A sector's newest record and next slot, as if it were the active one.
-    fn look(&mut self, sector: u32) -> Active {
+    /// A sector's newest record and next slot, as if it were the active one; behind this number of blank slots there is nothing.
+    #[inline(never)]
+    fn look(&mut self, sector: u32, blank_slots: u32) -> Active {
         let mut active = Active {
             sector,
             next: 0,
             sequence: 0,
             has_spare: false,
         };
-        for slot in 0..Self::SLOTS {
-            match self.slot(sector, slot) {
+        let (mut slot, mut blank) = (0, 0);
+        while slot < Self::SLOTS && blank < blank_slots {
+            let content = self.slot(sector, slot);
+            blank = content.blank_after(blank);
+            slot += content.slots();
+            match content {
                 Content::Blank => {}
-                Content::Broken => active.next = slot + 1,
+                Content::Broken => active.next = slot,
                 Content::Record { sequence, kind, .. } => {
-                    active.next = slot + 1;
+                    active.next = slot;
                     active.sequence = active.sequence.max(sequence);
                     active.has_spare |= kind == Kind::SpareErased as u8;
                 }
             }
         }
         active
+    }
+}
+
+impl Content {
+    /// Blank slots in a row up to this content, with this number before it.
+    const fn blank_after(&self, before: u32) -> u32 {
+        match self {
+            Self::Blank => before + 1,
+            Self::Broken | Self::Record { .. } => 0,
+        }
+    }
+
+    /// Slots until the next content.
+    const fn slots(&self) -> u32 {
+        match self {
+            Self::Record { length, .. } => slots_of(*length as usize) as u32,
+            Self::Blank | Self::Broken => 1,
+        }
+    }
+}
+
+/// A record's bytes.
+struct Record {
+    bytes: [u8; RECORD_MAX],
+    slots: u32,
+}
+
+impl Record {
+    fn new(sequence: u32, kind: Kind, payload: &[u8]) -> Option<Self> {
+        let mut bytes = [BLANK; RECORD_MAX];
+        let length = u8::try_from(payload.len()).ok()?;
+        let slots = slots_of(payload.len());
+        let whole = bytes.get_mut(..slots * SLOT)?;
+        let (data, crc) = whole.split_at_mut(slots * SLOT - CRC);
+        let (head, place) = data.split_at_mut(HEAD);
+        place.get_mut(..payload.len())?.copy_from_slice(payload);
+        for (to, from) in head
+            .iter_mut()
+            .zip(sequence.to_le_bytes().into_iter().chain([kind as u8, length]))
+        {
+            *to = from;
+        }
+        crc.copy_from_slice(&crc32(data).to_le_bytes());
+        Some(Self {
+            bytes,
+            slots: slots as u32,
+        })
+    }
+
+    fn bytes(&self) -> &[u8] {
+        self.bytes.get(..self.slots as usize * SLOT).unwrap_or(&[])
     }
 }
 

@@ -145,6 +145,25 @@ impl Upload {
         offset: u32,
         words: &[i32],
     ) -> Result<(), Reason> {
+        self.take(machine, offset, words)?;
+        let Some(rows) = &mut self.rows else {
+            return Ok(());
+        };
+        for (at, word) in (offset..).zip(words) {
+            if rows.take(at, *word) {
+                rows.check(machine)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes the next words of a job, without a look at the rows of a streamed one.
+    pub(crate) fn take(
+        &mut self,
+        machine: &mut impl Machine,
+        offset: u32,
+        words: &[i32],
+    ) -> Result<(), Reason> {
         if offset != self.received {
             return Err(Reason::WrongOffset {
                 expected: self.received,
@@ -165,14 +184,8 @@ impl Upload {
             .load_words(offset, words)
             .map_err(|fault| refused(fault, None))?;
         self.received = end;
-        let Some(rows) = &mut self.rows else {
+        if self.rows.is_none() {
             self.digest.words(words);
-            return Ok(());
-        };
-        for (at, word) in (offset..).zip(words) {
-            if rows.take(at, *word) {
-                rows.check(machine)?;
-            }
         }
         Ok(())
     }
@@ -190,7 +203,7 @@ impl Upload {
     }
 
     /// `JobEnd`. Ends the upload with either outcome; after a refusal the machine is idle. That of a streamed job goes on, and its rows are checked already.
-    pub(crate) fn finish(self, machine: &mut impl Machine) -> Result<(), Reason> {
+    pub(crate) fn finish(&self, machine: &mut impl Machine) -> Result<(), Reason> {
         if self.is_streamed() {
             return machine.load_finish().map_err(|fault| refused(fault, None));
         }

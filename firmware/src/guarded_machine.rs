@@ -2,14 +2,16 @@
 //! time, and through a queue.
 
 use controller::{
+    jobs::JobStore,
     machine::{Busy, Instruction, Machine, describe},
     realtime::RealTime,
     safety::Order,
     settings::Settings,
-    storage::{JOURNAL_SLOT, Kind, Storage, StorageError},
+    storage::StorageError,
 };
 use heapless::spsc::Producer;
 use interp_core::{
+    RunStart,
     fault::Fault,
     job::{Header, stream::RecordCopy},
     steps::{CheckedSteps, StepConfig},
@@ -18,37 +20,40 @@ use protocol::message::{Description, InputLines, Journal, MotionStatus, Offsets,
 use rtic::Mutex;
 
 use crate::{
-    board::{self, BOARD, JournalFlash, SettingsFlash},
+    board::{self, BOARD, FallingFlash, JobFlash, SettingsFlash},
     design_parameters::{FIRMWARE_VERSION, JOB_WORDS, PERIOD_US},
+    drivers::supply::FallingRecord,
 };
 
 /// The real-time half of this board.
 pub(crate) type BoardRealTime = RealTime<&'static mut [i32; JOB_WORDS]>;
 
-/// The journal of this board.
-pub(crate) type BoardJournal = Storage<JournalFlash, JOURNAL_SLOT>;
-
 /// [`Machine`] by means of RTIC. Every lock is held for one call of [`RealTime`], each of bounded length: a
 /// chunk of words, a record, or a copy of the status.
-pub(crate) struct GuardedMachine<'a, M> {
+pub(crate) struct GuardedMachine<'a, M, F> {
     /// The real-time half.
     pub(crate) real_time: M,
+    /// The record of a failing supply.
+    pub(crate) falling: F,
     /// Commands to the next tick.
     pub(crate) commands: &'a mut Producer<'static, Instruction>,
-    /// The machine's profile.
+    /// The machine's profile, and the journal.
     pub(crate) settings: &'a mut Settings<SettingsFlash>,
-    /// How far the last run came.
-    pub(crate) journal: &'a mut BoardJournal,
+    /// The jobs that the board keeps.
+    pub(crate) jobs: &'a mut JobStore<JobFlash>,
 }
 
-impl<M: Mutex<T = BoardRealTime>> GuardedMachine<'_, M> {
+/// The record of a failing supply of this board.
+pub(crate) type BoardFalling = FallingRecord<FallingFlash>;
+
+impl<M: Mutex<T = BoardRealTime>, F: Mutex<T = BoardFalling>> GuardedMachine<'_, M, F> {
     /// See [`RealTime::wants_tick`].
     pub(crate) fn wants_tick(&mut self) -> bool {
         self.real_time.lock(|real_time| real_time.wants_tick())
     }
 }
 
-impl<M: Mutex<T = BoardRealTime>> Machine for GuardedMachine<'_, M> {
+impl<M: Mutex<T = BoardRealTime>, F: Mutex<T = BoardFalling>> Machine for GuardedMachine<'_, M, F> {
     fn description(&mut self) -> Description {
         describe(FIRMWARE_VERSION, BOARD.id, JOB_WORDS, PERIOD_US)
     }
@@ -114,12 +119,44 @@ impl<M: Mutex<T = BoardRealTime>> Machine for GuardedMachine<'_, M> {
     }
 
     fn journal(&mut self) -> Option<Journal> {
-        let newest = self.journal.newest(Kind::Journal)?;
-        Journal::read(newest.bytes())
+        self.settings.journal()
     }
 
     fn keep_journal(&mut self, journal: &Journal) -> Result<(), StorageError> {
-        self.journal.keep(Kind::Journal, &journal.write())
+        if board::HAS_JOURNAL {
+            self.settings.keep_journal(journal)
+        } else {
+            Err(StorageError)
+        }
+    }
+
+    fn prepare_journal(&mut self, journal: Option<&Journal>) {
+        // The supply may have come back before it was too low.
+        let was_written = self.falling.lock(FallingRecord::take_written);
+        let prepared = self.settings.prepare_journal(journal, was_written);
+        self.falling.lock(|falling| falling.set(prepared));
+    }
+
+    type JobFlash = JobFlash;
+
+    fn jobs(&mut self) -> &mut JobStore<JobFlash> {
+        self.jobs
+    }
+
+    fn loaded(&mut self) -> Option<(Header, u32)> {
+        self.real_time.lock(|real_time| {
+            let (header, words) = real_time.loaded()?;
+            Some((*header, u32::try_from(words.len()).ok()?))
+        })
+    }
+
+    fn loaded_words(&mut self, offset: u32, words: &mut [i32]) -> usize {
+        self.real_time
+            .lock(|real_time| real_time.loaded_words(offset, words))
+    }
+
+    fn place(&mut self) -> Option<RunStart> {
+        self.real_time.lock(|real_time| real_time.place())
     }
 
     fn own_steps(&mut self) -> StepConfig {

@@ -1,6 +1,7 @@
-//! The firmware: four tasks around the machine.
+//! The firmware: five tasks around the machine.
 //!
 //! ```text
+//!  priority 4   supply    PVD, the voltage falls  the journal's record of it
 //!  priority 3   receive   USART1, every byte      port ──► bytes
 //!  priority 2   sample    TIM2, every period      commands ──► RealTime::tick ──► events
 //!  priority 1   plan      EXTI0, after a sample   RealTime::plan
@@ -34,7 +35,8 @@ defmt::timestamp!("{=u64:us}", u64::from(uptime_periods()) * u64::from(PERIOD_US
 mod app {
     use boards::{Line, Role};
     use controller::{
-        link::Link, machine::Instruction, realtime::RealTime, settings::Settings, step_output::Buffers,
+        jobs::JobStore, link::Link, machine::Instruction, realtime::RealTime, settings::Settings,
+        step_output::Buffers,
     };
     use cortex_m::peripheral::NVIC;
     use heapless::spsc::{Consumer, Producer, Queue};
@@ -60,7 +62,7 @@ mod app {
             watchdog::Watchdog,
         },
         events::{EventMemory, EventSource},
-        guarded_machine::{BoardJournal, BoardRealTime, GuardedMachine},
+        guarded_machine::{BoardFalling, BoardRealTime, GuardedMachine},
         plan_task,
         sample_task::{Guards, SampleTask},
         watch::Watch,
@@ -78,6 +80,7 @@ mod app {
     #[shared]
     struct Shared {
         real_time: BoardRealTime,
+        falling: BoardFalling,
     }
 
     #[local]
@@ -89,7 +92,7 @@ mod app {
         transmitter: Transmitter,
         led: StatusLed<Output>,
         settings: Settings<board::SettingsFlash>,
-        journal: BoardJournal,
+        jobs: JobStore<board::JobFlash>,
         bytes_in: Producer<'static, u8>,
         bytes_out: Consumer<'static, u8>,
         commands_in: Producer<'static, Instruction>,
@@ -136,7 +139,7 @@ mod app {
         }
         // Before the first tick, because an erase stops the processor.
         let settings = Settings::open(board.settings);
-        let journal = BoardJournal::open(board.journal);
+        let jobs = JobStore::open(board.jobs);
         let timer = SampleTimer::new(board.tim2, board.tim5, board::TIMER_RELOAD, PERIOD_COUNTS);
         let mut real_time = RealTime::with_store(context.local.store);
         real_time.set_tick_budget(TICK_BUDGET_CYCLES);
@@ -161,7 +164,10 @@ mod app {
         }
         let (transmitter, receiver) = serial::open(board.usart1, board::SERIAL_DIVIDER);
         (
-            Shared { real_time },
+            Shared {
+                real_time,
+                falling: BoardFalling::new(board.falling),
+            },
             Local {
                 task: SampleTask::new(timer, counter, commands_out, events_in),
                 guards,
@@ -170,7 +176,7 @@ mod app {
                 transmitter,
                 led: StatusLed::new(Output::new(LED.pin), LED.active),
                 settings,
-                journal,
+                jobs,
                 bytes_in,
                 bytes_out,
                 commands_in,
@@ -215,11 +221,28 @@ mod app {
         context.shared.real_time.lock(plan_task::plan);
     }
 
+    /// The voltage falls, or is back.
+    ///
+    /// | | |
+    /// |---|---|
+    /// | priority | 4, the highest: some milliseconds are left |
+    /// | period | none |
+    /// | worst case | the ten words of a record: 0.2 ms, 1.1 ms by the chip's data sheet |
+    /// | a miss | the record before it stands, and the pass is machined again |
+    /// | a panic | cannot be reached, as in the sample task |
+    #[task(binds = PVD, priority = 4, shared = [falling])]
+    fn supply(mut context: supply::Context) {
+        context
+            .shared
+            .falling
+            .lock(|falling| falling.changed(board::supply_is_low()));
+    }
+
     /// Reads a byte from the port.
     ///
     /// | | |
     /// |---|---|
-    /// | priority | 3, the highest: the port has no FIFO, and a tick may take 18 byte times |
+    /// | priority | 3: the port has no FIFO, and a tick may take 18 byte times |
     /// | period | 11 us at 921 600 baud, while the host sends |
     /// | worst case | a few dozen cycles, and the few instructions that hold all interrupts off; a line of the log does not |
     /// | a miss | the byte is lost and counted; its frame fails its check, and the host repeats it |
@@ -243,26 +266,29 @@ mod app {
     /// | worst case | one frame's answer and its time on the line, 3.3 ms; a finished upload checks every record before its answer |
     /// | a miss | in lockstep time waits for it; on a free clock events are lost once their queue is full, and counted (`samples_lost`) |
     #[idle(
-        shared = [real_time],
-        local = [transmitter, led, settings, journal, bytes_out, commands_in, events_out]
+        shared = [real_time, falling],
+        local = [transmitter, led, settings, jobs, bytes_out, commands_in, events_out]
     )]
     fn idle(context: idle::Context) -> ! {
         let idle::LocalResources {
             transmitter,
             led,
             settings,
-            journal,
+            jobs,
             bytes_out,
             commands_in,
             events_out,
             ..
         } = context.local;
-        let idle::SharedResources { real_time, .. } = context.shared;
+        let idle::SharedResources {
+            real_time, falling, ..
+        } = context.shared;
         let mut machine = GuardedMachine {
             real_time,
+            falling,
             commands: commands_in,
             settings,
-            journal,
+            jobs,
         };
         transmitter.listen();
         // A constant is copied to where it is kept; of a call's result LLVM may keep a second one, 4 KB, on the stack.

@@ -16,6 +16,7 @@ use crate::{
         safety_inputs::{ReadPorts, SafetyInputs},
         sample_timer::SampleTimer,
         step_output::StepDriver,
+        supply,
         watchdog::{Registers, Watchdog},
     },
     events::EventQueue,
@@ -92,7 +93,7 @@ impl SampleTask {
         let input = TickInput {
             missed: self.missed,
             cycles: self.cycles,
-            lines: guards.inputs.read(),
+            lines: guards.inputs.read().or(supply::lines()),
         };
         real_time.tick(input, &mut self.events);
         if let Some(inverted) = guards.drives.set(real_time.outputs()) {

@@ -8,7 +8,7 @@ use crate::job::{Header, STORE_WORDS};
 use crate::pass::patch::Patch;
 use crate::pass::position::PassPosition;
 use crate::pass::run::Run;
-use crate::sample::{Sample, SpanParameter, State, interval_of};
+use crate::sample::{RunStart, Sample, SpanParameter, State, interval_of};
 use crate::sequence::sequencer::{FeedCommand, Outcome, Sequencer};
 
 /// Periods over which an external fault decelerates the run to zero feed: 1/32 of the feed per period.
@@ -63,10 +63,19 @@ impl<S> Interpolator<S> {
 }
 
 impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
-    /// The pass with which the next run begins, of a job with axis limits; 0 at power-up, after each start and each load. The passes before it are skipped in the
-    /// planning while the tool stands: those from it on are the same as in a run of the whole job.
-    pub const fn begin_at(&mut self, pass: u32) {
-        self.motion.sequencer.begin_at(pass);
+    /// Where the next run begins, of a job with axis limits; at the start of the job at power-up, after each start and each load. The passes before are skipped in
+    /// the planning while the tool stands: those from there on are the same as in a run of the whole job. On a place within a pass the tool begins at rest, with that
+    /// place's sample, and goes on along the same path.
+    pub const fn begin_at(&mut self, start: RunStart) {
+        self.motion.sequencer.begin_at(start);
+    }
+
+    /// The place on the pass that the tool is on, to begin another run with: pass and path parameter. None off the passes, and near the ends of a pass.
+    #[must_use]
+    pub fn place(&self) -> Option<RunStart> {
+        let (pass, path, _) = self.motion.run.surface_position();
+        let is_within = self.motion.state.is_under_way() && self.motion.sequencer.is_within();
+        is_within.then_some(RunStart { pass, path })
     }
 
     /// Whether the tool has left the surface for a pause, and is held above it.
@@ -159,6 +168,15 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
         self.motion.may_continue_loading()?;
         let Motion { program, run, .. } = &mut self.motion;
         program.check(self.store.as_ref(), record, run.lines.scratch())
+    }
+
+    /// Header of the loaded job, and its data words; none where none is loaded, or it is streamed.
+    #[must_use]
+    pub fn loaded(&self) -> Option<(&Header, &[i32])> {
+        let is_loaded = self.motion.state != State::Idle && !self.is_streamed();
+        let [words, _] = self.motion.program.room();
+        let words = self.store.as_ref().get(..words as usize).filter(|_| is_loaded)?;
+        Some((self.motion.program.header(), words))
     }
 
     /// Seals the job: the machine is ready.
@@ -366,7 +384,7 @@ impl Motion {
         self.program.begin(header, words, capacity)?;
         self.state = State::Idle;
         self.fault = None;
-        self.sequencer.begin_at(0);
+        self.sequencer.begin_at(RunStart::FIRST);
         Ok(())
     }
 

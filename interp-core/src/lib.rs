@@ -88,5 +88,5 @@ pub use job::encode;
 pub use job::program::front_words;
 pub use job::{AxisLimits, Header, Pattern, STORE_WORDS, Spacing, SurfaceKind, ToolSide};
 pub use math::number::NM_PER_MM;
-pub use sample::{Sample, SpanParameter, State};
+pub use sample::{RunStart, Sample, SpanParameter, State};
 pub use steps::{AxisSteps, StepConfig, Steps};

@@ -90,6 +90,41 @@ impl SpanParameter {
     };
 }
 
+/// Where a run begins: the start of a pass, or a place on it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RunStart {
+    /// The pass, from 0.
+    pub pass: u32,
+    /// Path parameter of the place; [`SpanParameter::NONE`]: the start of the pass.
+    pub path: SpanParameter,
+}
+
+impl RunStart {
+    /// The start of the job.
+    pub const FIRST: Self = Self {
+        pass: 0,
+        path: SpanParameter::NONE,
+    };
+
+    /// Whether it is the start of the job.
+    #[must_use]
+    pub fn is_first(self) -> bool {
+        self == Self::FIRST
+    }
+
+    /// The place within the pass, if it is one.
+    #[must_use]
+    pub fn within(self) -> Option<SpanParameter> {
+        (self.path != SpanParameter::NONE).then_some(self.path)
+    }
+}
+
+impl Default for RunStart {
+    fn default() -> Self {
+        Self::FIRST
+    }
+}
+
 /// One period's result. Positions are integers; host and board compute bit-identical samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sample {

@@ -56,3 +56,21 @@ pub(crate) mod span_parameter {
         })
     }
 }
+
+/// The place that a run begins at: its pass, then its path parameter.
+pub(crate) mod run_start {
+    use interp_core::{RunStart, SpanParameter};
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    #[derive(Serialize, Deserialize)]
+    struct Fields(u32, #[serde(with = "super::span_parameter")] SpanParameter);
+
+    pub(crate) fn serialize<S: Serializer>(start: &RunStart, serializer: S) -> Result<S::Ok, S::Error> {
+        Fields(start.pass, start.path).serialize(serializer)
+    }
+
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<RunStart, D::Error> {
+        let Fields(pass, path) = Fields::deserialize(deserializer)?;
+        Ok(RunStart { pass, path })
+    }
+}

@@ -1,9 +1,9 @@
 //! The journal of a run: how far it came, kept beyond a power cut.
 
-use interp_core::job::Header;
+use interp_core::{RunStart, SpanParameter, job::Header};
 use serde::{Deserialize, Serialize};
 
-use crate::{frame::crc32, records::HeaderFields};
+use crate::{codes, frame::crc32, records::HeaderFields};
 
 /// How far the last run of a job with axis limits came.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -19,10 +19,13 @@ pub struct Journal {
     pub pass: u32,
     /// The run came to its end.
     pub is_finished: bool,
+    /// Path parameter of a place on that pass up to which it is complete; [`SpanParameter::NONE`]: its start.
+    #[serde(with = "codes::span_parameter")]
+    pub path: SpanParameter,
 }
 
-/// Bytes of a [`Journal`].
-pub const JOURNAL_BYTES: usize = 17;
+/// Bytes of a [`Journal`], at most.
+pub const JOURNAL_BYTES: usize = 28;
 
 impl Journal {
     /// Its bytes.
@@ -32,6 +35,15 @@ impl Journal {
         // It has a fixed length, which a test holds.
         let _ = postcard::to_slice(self, &mut bytes);
         bytes
+    }
+
+    /// Where a run of the job goes on.
+    #[must_use]
+    pub const fn start(&self) -> RunStart {
+        RunStart {
+            pass: self.pass,
+            path: self.path,
+        }
     }
 
     /// Reads what [`Self::write`] has written.
@@ -72,6 +84,10 @@ mod tests {
             profile: 7,
             pass: 1 << 31,
             is_finished: true,
+            path: SpanParameter {
+                span: u16::MAX,
+                fraction: u64::MAX - 2,
+            },
         };
         assert_eq!(Journal::read(&journal.write()), Some(journal));
         assert_eq!(Journal::read(&[0; 3]), None);

@@ -65,6 +65,9 @@
 //! | a spindle on a machine without one | `Nak`, `NoSpindle` | |
 //! | a start of a streamed job whose first rows were overwritten | `Nak`, `RowsGone` | |
 //! | a start at a pass, of a job without axis limits or of a streamed one | `Nak`, `WholeOnly` | |
+//! | an order about a stored job that there is not | `Nak`, `NoStoredJob` | |
+//! | a job to be stored for which there is no room | `Nak`, `NoRoom` with the words that there is room for | |
+//! | a start of a stored job where the last run was cut short, if it was another or none | `Nak`, `NothingToResume` | |
 //! | a `Repeat` of an event that is not kept any more | `Nak`, `EventGone` with the first that is | |
 //!
 //! Where the last column is empty, nothing has changed. An event that the line damages is lost: the host sees it by the numbers of the
@@ -104,6 +107,7 @@ mod reason;
 mod records;
 pub mod safety;
 mod spindle;
+mod stored;
 pub mod version;
 
 pub use version::{PROTOCOL_VERSION, VersionMismatch};

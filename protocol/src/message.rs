@@ -54,10 +54,14 @@
 //! | 28 | `SetOffsets` | the fields of [`Offsets`] | `Ack`, and it holds, also after a power cut |
 //! | 29 | `Spindle` | turning (a byte: 0 off, 1 clockwise, 2 counterclockwise), speed (1/min, `u32`), coolant (a byte) | as `Configure`; for the runs of the loaded job |
 //! | 30 | `Pause` | | as `Start` |
-//! | 31 | `StartAt` | pass `u32` | as `Start`; a job with axis limits that is not streamed |
+//! | 31 | `StartAt` | pass `u32`, path parameter of the place on it (span 65535: its start) | as `Start`; a job with axis limits that is not streamed |
 //! | 32 | `Journal` | | `Journal` |
 //! | 33 | `Turn` | turning (as in `Spindle`), speed (1/min, `u32`) | as `Configure`; off where the host is not heard for a second |
 //! | 34 | `Coolant` | 0 off, 1 on | as `Turn` |
+//! | 35 | `StoreJob` | name (text), 1 where its runs begin where the axes stand | `Ack`: the loaded job is kept, also after a power cut |
+//! | 36 | `DeleteJob` | name | `Ack` |
+//! | 37 | `StoredJob` | number of the stored job, from 0, `u8` | `StoredJob` |
+//! | 38 | `StartJob` | name, 1 to go on where the last run of it was cut short | `Ack`: it is loaded, and starts as by `Start` |
 //!
 //! Header: kind, pattern, spacing, tool side (a byte each), spans along path and side (`u16`), ball radius (mm), feed (mm/s),
 //! scallop height (mm), period (s) (`f32`), window of a streamed job (rows, `u16`; 0 for another one); then 0, or 1 and the axes' limits: velocity (mm/s), acceleration (mm/s^2), jerk (mm/s^3)
@@ -82,6 +86,7 @@
 //! | 9 | `Offsets` | number, the fields of [`Offsets`]; an answer |
 //! | 10 | `Room` | event `u32`, words up to which there is room `u32` |
 //! | 11 | `Journal` | number, option of the fields of [`Journal`]; an answer |
+//! | 12 | `StoredJob` | number, option of the fields of [`StoredJobInfo`] (none beyond the last), words of the longest job for which there is room `u32`; an answer |
 //!
 //! A parameter is its span (`u16`) and fraction. `Halted` comes when the ticks of a `Run` are used up, or when a run ends
 //! (finished, faulted, aborted), whichever is first.
@@ -111,7 +116,7 @@
 //! there. One request at a time: the host waits for the answer, or sends the same bytes again. [`Reason::uses_number`] defines
 //! which answers consume a number.
 
-use interp_core::{command::Command, job::Header};
+use interp_core::{RunStart, command::Command, job::Header};
 use serde::{Deserialize, Serialize};
 
 pub use crate::journal::{JOURNAL_BYTES, Journal, job_mark};
@@ -129,7 +134,9 @@ pub use crate::safety::{
     PauseCause, ResetCause, SafetyStatus,
 };
 pub use crate::spindle::{AtSpeed, PWM_STEPS, SpindleOrder, SpindleSettings, Turning};
+pub use crate::stored::{JOB_NAME_MAX, JobName, STORED_JOB_BYTES_MAX, StoredJob, StoredJobInfo};
 use crate::{
+    codes,
     records::HeaderFields,
     version::{PROTOCOL_VERSION, VersionMismatch},
 };
@@ -269,11 +276,8 @@ pub enum Request {
     Spindle(SpindleOrder),
     /// Hold, and leave the surface; `Resume` comes back to the same place.
     Pause,
-    /// Run the job from the beginning of a pass, as a run of the whole job would have it. Jobs with axis limits only.
-    StartAt {
-        /// The pass, from 0.
-        pass: u32,
-    },
+    /// Run the job from a pass, or a place on it, as a run of the whole job would have it. Jobs with axis limits only.
+    StartAt(#[serde(with = "codes::run_start")] RunStart),
     /// Asks for the run that was under way last, also before a power cut.
     Journal,
     /// Switches the spindle outside a run; off where the host is not heard for a second, and at the next start, which has the job's own.
@@ -287,6 +291,30 @@ pub enum Request {
     Coolant {
         /// Whether to switch it on.
         on: bool,
+    },
+    /// Keeps the loaded job beyond a power cut, in place of one of that name. Refused while a run is under way.
+    StoreJob {
+        /// The name to keep it by.
+        name: JobName,
+        /// Its runs begin where the axes stand, not at its home.
+        begins_anywhere: bool,
+    },
+    /// Keeps a job no longer. Refused while a run is under way.
+    DeleteJob {
+        /// Its name.
+        name: JobName,
+    },
+    /// Asks for a stored job.
+    StoredJob {
+        /// Its number, from 0.
+        index: u8,
+    },
+    /// Loads a stored job, and starts it.
+    StartJob {
+        /// Its name.
+        name: JobName,
+        /// Go on where the last run of the job was cut short.
+        resumes: bool,
     },
 }
 
@@ -427,6 +455,15 @@ pub enum Reply {
         number: u16,
         /// The last run; none where the board has journalled none.
         journal: Option<Journal>,
+    },
+    /// Answer to `StoredJob`.
+    StoredJob {
+        /// Number of the request.
+        number: u16,
+        /// The job; none where there are fewer.
+        job: Option<StoredJobInfo>,
+        /// Words of the longest job for which there is room.
+        room: u32,
     },
 }
 

@@ -158,6 +158,15 @@ pub enum Reason {
     SpindleTurns,
     /// 34: a jog at a feed override of 0.
     NoFeed,
+    /// 35: no job of this name is stored.
+    NoStoredJob,
+    /// 36: the flash has no room for the job.
+    NoRoom {
+        /// Words of the longest job for which there is room.
+        words: u32,
+    },
+    /// 37: the last run was not one of this job, or came to its end.
+    NothingToResume,
 }
 
 impl Reason {
@@ -200,6 +209,9 @@ impl Reason {
             Self::WholeOnly => 32,
             Self::SpindleTurns => 33,
             Self::NoFeed => 34,
+            Self::NoStoredJob => 35,
+            Self::NoRoom { .. } => 36,
+            Self::NothingToResume => 37,
         }
     }
 
@@ -372,6 +384,15 @@ impl fmt::Display for Reason {
             Self::WholeOnly => write!(
                 formatter,
                 "only a job with axis limits that fits into the board's store can begin at a pass"
+            ),
+            Self::NoStoredJob => write!(formatter, "the board keeps no job of this name"),
+            Self::NoRoom { words } => write!(
+                formatter,
+                "the board's flash has room for a job of {words} words only"
+            ),
+            Self::NothingToResume => write!(
+                formatter,
+                "the last run was not one of this job, or came to its end"
             ),
         }
     }

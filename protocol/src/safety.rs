@@ -19,6 +19,8 @@ pub use interp_core::command::{OVERRIDE_MAX_PERCENT, OVERRIDE_NORMAL_PERCENT};
 /// | 11 | probe |
 /// | 12 | safety door, or another request for a hold |
 /// | 13 | the spindle is at speed |
+/// | 14 | start button |
+/// | 15 | the supply of the board is low; counts as a drive fault |
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct InputLines(pub u16);
 
@@ -29,10 +31,14 @@ impl InputLines {
     pub const EMERGENCY_STOP: Self = Self(1);
     /// All limit switches.
     pub const LIMITS: Self = Self(0x7e);
-    /// The drive faults of all axes, and the common one.
-    pub const DRIVE_FAULTS: Self = Self(0x780);
+    /// The drive faults of all axes, the common one, and that of the supply.
+    pub const DRIVE_FAULTS: Self = Self(0x8780);
     /// All inputs.
-    pub const ALL: Self = Self(0x3fff);
+    pub const ALL: Self = Self(0xffff);
+    /// The start button, which stops no run.
+    pub const START: Self = Self(0x4000);
+    /// The supply of the board is low.
+    pub const SUPPLY: Self = Self(0x8000);
     /// The probe, which stops no run.
     pub const PROBE: Self = Self(0x800);
     /// The safety door is open: a run pauses.
@@ -41,7 +47,7 @@ impl InputLines {
     pub const AT_SPEED: Self = Self(0x2000);
 
     /// Names of the inputs, by bit.
-    pub const NAMES: [&str; 14] = [
+    pub const NAMES: [&str; 16] = [
         "emergency stop",
         "limit switch x-",
         "limit switch x+",
@@ -56,6 +62,8 @@ impl InputLines {
         "probe",
         "safety door",
         "spindle at speed",
+        "start button",
+        "supply",
     ];
 
     /// Intersection.
@@ -275,9 +283,10 @@ mod tests {
             InputLines::PROBE,
             InputLines::DOOR,
             InputLines::AT_SPEED,
+            InputLines::START,
         ];
         let counts = classes.map(|class| class.names().count());
-        assert_eq!(counts, [1, 6, 4, 1, 1, 1]);
+        assert_eq!(counts, [1, 6, 5, 1, 1, 1, 1]);
         let all = classes.into_iter().fold(InputLines::NONE, InputLines::or);
         assert_eq!(all, InputLines::ALL);
         assert_eq!(all.names().count(), InputLines::NAMES.len());

@@ -67,6 +67,13 @@ pub(super) fn tool() -> PathBuf {
     built().sim.clone()
 }
 
+/// The image for a board.
+pub(super) fn image(board: &Board) -> PathBuf {
+    built();
+    let image = format!("target/{}/thumbv7em-none-eabihf/release/firmware", board.build.1);
+    workspace().join(image)
+}
+
 /// Runs the tool with these arguments and an empty standard input. Returns whether it succeeded, and its output.
 pub(super) fn sim<S: AsRef<std::ffi::OsStr>>(arguments: impl IntoIterator<Item = S>) -> (bool, String) {
     sim_typed(arguments, "")
@@ -112,6 +119,8 @@ pub(super) struct Ended {
     pub(super) board: &'static Board,
     pub(super) report: Value,
     pub(super) edges: Vec<Edge>,
+    /// Every step of a machine's carriages, if they were tracked: cycle, place in steps.
+    pub(super) track: Vec<(u64, [i32; 3])>,
 }
 
 /// A change of a port's output levels or directions.
@@ -138,14 +147,25 @@ impl Emulated {
         Self::begin(board, &["--machine", machine], false)
     }
 
+    /// The same, and each step of its carriages is kept.
+    pub(super) fn tracked(board: &'static Board, machine: &str) -> Self {
+        Self::begin(board, &["--machine", machine, "--track", "track"], false)
+    }
+
+    /// Has an event happen now.
+    pub(super) fn happens(&mut self, event: &str) {
+        let input = self.child.stdin.as_mut().unwrap();
+        writeln!(input, "{event}").unwrap();
+        input.flush().unwrap();
+    }
+
     /// Starts an execution of another image that records every change of the outputs.
     pub(super) fn of_image(board: &'static Board, image: &Path, arguments: &[&str]) -> Self {
         Self::begin_image(board, image, &[&["--fast"], arguments].concat(), true)
     }
 
     fn begin(board: &'static Board, arguments: &[&str], is_recorded: bool) -> Self {
-        let image = format!("target/{}/thumbv7em-none-eabihf/release/firmware", board.build.1);
-        Self::begin_image(board, &workspace().join(image), arguments, is_recorded)
+        Self::begin_image(board, &image(board), arguments, is_recorded)
     }
 
     fn begin_image(board: &'static Board, image: &Path, arguments: &[&str], is_recorded: bool) -> Self {
@@ -154,7 +174,9 @@ impl Emulated {
         if is_recorded {
             command.arg("--edges").arg(folder.path().join("edges"));
         }
+        // What it writes by a relative path goes there, too.
         let child = command
+            .current_dir(folder.path())
             .arg(image)
             .arg("--pty")
             .arg(folder.path().join("line"))
@@ -232,10 +254,17 @@ impl Emulated {
             serde_json::from_slice(&std::fs::read(self.folder.path().join("report")).unwrap()).unwrap();
         let edges = std::fs::read(self.folder.path().join("edges"));
         let edges = edges.map(|bytes| bytes.chunks_exact(16).map(Edge::read).collect());
+        let track = std::fs::read(self.folder.path().join("track")).unwrap_or_default();
+        let track = track.chunks_exact(20).map(|bytes| {
+            let word = |at: usize| i32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
+            let cycle = u64::from_le_bytes(bytes[..8].try_into().unwrap());
+            (cycle, [word(8), word(12), word(16)])
+        });
         Ended {
             board: self.board,
             report,
             edges: edges.unwrap_or_default(),
+            track: track.collect(),
         }
     }
 }

@@ -17,9 +17,9 @@ const STEP_INVERTED: [bool; 3] = [true, false, true];
 const ENABLE_INVERTED: [bool; 3] = [false, true, false];
 const PULSE_US: u64 = 2;
 
-/// Cycles from a reset until the pins have the profile's levels, four seconds and a half: the erases of two sectors of two seconds come first, the settings' and the journal's, once after
+/// Cycles from a reset until the pins have the profile's levels, two seconds and a half: the erases of two sectors of a second come first, the settings' and the journal's, once after
 /// the first record in each. Until then they have those of the board's table.
-const LEVELS_CYCLES: u64 = 4_500_000 * CYCLES_US;
+const LEVELS_CYCLES: u64 = 2_500_000 * CYCLES_US;
 
 /// The active level of a line.
 fn active(line: &Line, is_inverted: bool) -> bool {

@@ -8,9 +8,9 @@ use protocol::message::{JogWay, Request};
 use super::emulated::{Emulated, sim};
 
 /// Travel of 60 x 50 x 30 mm; switches 1 mm beyond; a plate at -21.3 mm.
-const MACHINE: &str = "lower=-1,-1,-31;upper=61,51,1;plate=-21.3;start=9,7,-4";
+pub(super) const MACHINE: &str = "lower=-1,-1,-31;upper=61,51,1;plate=-21.3;start=9,7,-4";
 
-const PROFILE: &str = "[machine]
+pub(super) const PROFILE: &str = "[machine]
 velocity_max_mm_s = [60.0, 60.0, 30.0]
 acceleration_max_mm_s2 = [1000.0, 1000.0, 500.0]
 jerk_max_mm_s3 = [20000.0, 20000.0, 10000.0]

@@ -9,7 +9,7 @@ use protocol::message::{Profile, Request};
 
 use super::emulated::{Emulated, sim};
 
-/// Bytes written between two failures of the supply: not a multiple of a record's, so that each failure is at another place of it.
+/// Words written between two failures of the supply: not a multiple of a record's, so that each failure is at another place of it.
 const BETWEEN_CUTS: u64 = 61;
 /// Failures of the supply.
 const CUTS: u32 = 10;
@@ -22,7 +22,7 @@ fn with_speed(speed: u32) -> Profile {
 }
 
 /// A session with the board, once it has started.
-fn session(emulated: &Emulated, number: u32) -> Session {
+pub(super) fn session(emulated: &Emulated, number: u32) -> Session {
     for _ in 0..50 {
         match Session::open(port::open(&emulated.port()).unwrap(), number) {
             Ok(session) => return session,

@@ -7,12 +7,14 @@ pub mod motion;
 pub mod sequences;
 
 use controller::{
+    jobs::JobStore,
     machine::{Busy, Instruction, Machine, describe},
+    ram_flash::RamFlash,
     safety::{Order, may_start},
     storage::StorageError,
 };
 use interp_core::{
-    encode,
+    RunStart, encode,
     fault::{Fault, FaultKind},
     job::{Header, stream::RecordCopy},
     steps::{CheckedSteps, StepConfig},
@@ -187,6 +189,8 @@ pub struct Mock {
     pub offsets: Offsets,
     /// Its journal.
     pub journal: Option<Journal>,
+    /// It keeps no jobs, and has no place for any.
+    pub jobs: JobStore<RamFlash<0>>,
 }
 
 impl Machine for Mock {
@@ -267,6 +271,26 @@ impl Machine for Mock {
     fn keep_journal(&mut self, journal: &Journal) -> Result<(), StorageError> {
         self.journal = Some(*journal);
         Ok(())
+    }
+
+    fn prepare_journal(&mut self, _: Option<&Journal>) {}
+
+    type JobFlash = RamFlash<0>;
+
+    fn jobs(&mut self) -> &mut JobStore<RamFlash<0>> {
+        &mut self.jobs
+    }
+
+    fn loaded(&mut self) -> Option<(Header, u32)> {
+        None
+    }
+
+    fn loaded_words(&mut self, _: u32, _: &mut [i32]) -> usize {
+        0
+    }
+
+    fn place(&mut self) -> Option<RunStart> {
+        None
     }
 
     fn own_steps(&mut self) -> StepConfig {

@@ -6,7 +6,7 @@
 //! **Without a home.** Where none is required and none was declared, the axes count as standing at the job's home.
 //! **After a job without limits** the axes' position is unknown: no links led from pass to pass.
 
-use interp_core::command::Command;
+use interp_core::{RunStart, command::Command};
 use protocol::message::{Activity, InputLines, MotionStatus, Reason};
 
 use super::{RealTime, run::RunRecord};
@@ -60,12 +60,12 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
             Order::Spindle(order) => self.control.spindle.order(order)?,
             Order::Turn { turning, rpm } => self.turn(turning, rpm)?,
             Order::Coolant { on } => self.switch_coolant(on)?,
-            Order::BeginAt(pass) => {
+            Order::BeginAt(start) => {
                 let begins_anywhere = self.interpolator.has_limits() && !self.interpolator.is_streamed();
-                if pass > 0 && !begins_anywhere {
+                if !start.is_first() && !begins_anywhere {
                     return Err(Reason::WholeOnly);
                 }
-                self.interpolator.begin_at(pass);
+                self.interpolator.begin_at(start);
             }
             Order::Drives { .. } | Order::Configure(_) | Order::Acknowledge => {}
         }
@@ -111,7 +111,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
     #[inline(never)]
     pub(super) fn begin(&mut self) -> Option<Command> {
         if self.may_start().is_err() {
-            self.interpolator.begin_at(0);
+            self.interpolator.begin_at(RunStart::FIRST);
             return None;
         }
         match self.interpolator.home_nm() {

@@ -32,6 +32,7 @@ impl Session {
         if profile.is_some_and(|profile| !profile.is_valid()) {
             return Err(Reason::BadProfile);
         }
+        self.forget_places(machine);
         machine
             .keep_profile(profile)
             .map_err(|StorageError| Reason::Storage)?;
@@ -48,6 +49,7 @@ impl Session {
         offsets: &Offsets,
     ) -> Result<(), Reason> {
         no_run(machine)?;
+        self.forget_places(machine);
         machine
             .keep_offsets(offsets)
             .map_err(|StorageError| Reason::Storage)?;
@@ -64,23 +66,39 @@ impl Session {
 }
 
 /// Puts the supervision of the kept profile in force; returns the profile's digest, 0 where there is none.
-#[inline(never)]
 fn supervise(machine: &mut impl Machine) -> Result<u32, Reason> {
-    let profile = machine.profile();
-    let configuration = profile.map_or(Configuration::DEFAULT, |profile| profile.configuration);
+    let (configuration, digest) = supervision(machine);
     machine.order(Order::Configure(configuration))?;
-    Ok(profile.map_or(0, |profile| profile.digest()))
+    Ok(digest)
+}
+
+/// What the kept profile says of supervision, and its digest. A function of its own, because a profile on the stack is 200 bytes.
+#[inline(never)]
+fn supervision(machine: &mut impl Machine) -> (Configuration, u32) {
+    match machine.profile() {
+        Some(profile) => (profile.configuration, profile.digest()),
+        None => (Configuration::DEFAULT, 0),
+    }
+}
+
+/// Whether the machine has a spindle that the board switches.
+#[inline(never)]
+pub(super) fn has_spindle(machine: &mut impl Machine) -> bool {
+    machine.profile().is_some_and(|profile| profile.spindle.is_some())
 }
 
 /// Puts what the kept profile says of motion outside a job in force.
-#[inline(never)]
 fn set_up(machine: &mut impl Machine) -> Result<(), Reason> {
+    let setup = setup_of(machine);
+    machine.order(Order::SetUp(setup))
+}
+
+#[inline(never)]
+fn setup_of(machine: &mut impl Machine) -> Option<Setup> {
     #[allow(clippy::cast_precision_loss, reason = "a period is below 2^24 us")]
     let period_s = machine.description().period_us as f32 * 1e-6;
-    let profile = machine.profile();
-    machine.order(Order::SetUp(
-        profile.map(|profile| Setup::new(&profile, period_s)),
-    ))
+    let profile = machine.profile()?;
+    Some(Setup::new(&profile, period_s))
 }
 
 /// The settings of the drives of a job that has none: the profile's, or the board's own.

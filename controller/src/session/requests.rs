@@ -1,12 +1,14 @@
 //! The requests of a session, carried out.
 
-use interp_core::{command::Command, job::Header};
+use interp_core::{RunStart, command::Command, job::Header};
 use protocol::message::{
-    Activity, Clock, Excess, OVERRIDE_MAX_PERCENT, ProfileLimit, Reason, Reply, Request, Status, job_mark,
+    Activity, Clock, Excess, OVERRIDE_MAX_PERCENT, ProfileLimit, Reason, Reply, Request, SpindleOrder,
+    Status, job_mark,
 };
 
 use super::{
     Session,
+    jobs::{delete_job, stored_job},
     kept::{beyond, configure, has_other_steps, own_steps},
 };
 use crate::{
@@ -57,6 +59,7 @@ impl Session {
                     offsets: machine.offsets(),
                 };
             }
+            Request::StoredJob { index } => return stored_job(number, index, machine),
             _ if needs_rest(request) && machine.motion().activity != Activity::Rest => Err(Reason::Moving),
             Request::SetProfile(ref profile) => self.set_profile(machine, profile.as_ref()),
             Request::SetOffsets(ref offsets) => self.set_offsets(machine, offsets),
@@ -64,9 +67,15 @@ impl Session {
             Request::Probe { axis, nm, speed_mm_s } => {
                 machine.order(Order::Move(Motion::Probe { axis, nm, speed_mm_s }))
             }
-            Request::Spindle(order) => machine.order(Order::Spindle(order)),
+            Request::Spindle(order) => self.order_spindle(machine, order),
             Request::Turn { turning, rpm } => machine.order(Order::Turn { turning, rpm }),
             Request::Coolant { on } => machine.order(Order::Coolant { on }),
+            Request::StoreJob {
+                ref name,
+                begins_anywhere,
+            } => self.store_job(machine, name, begins_anywhere),
+            Request::DeleteJob { ref name } => delete_job(machine, name),
+            Request::StartJob { ref name, resumes } => self.start_job(machine, Some(name), resumes),
             Request::Home { axes } => machine.order(Order::Move(Motion::Home { axes })),
             Request::JobBegin {
                 ref header,
@@ -84,10 +93,10 @@ impl Session {
             | Request::Abort
             | Request::Stop
             | Request::Pause => match request.command() {
-                Some(command) => self.operate(machine, command, 0),
+                Some(command) => self.operate(machine, command, RunStart::FIRST),
                 None => Err(Reason::Unreadable),
             },
-            Request::StartAt { pass } => self.operate(machine, Command::Start, pass),
+            Request::StartAt(start) => self.operate(machine, Command::Start, start),
             Request::Override { percent } => set_override(machine, percent),
             Request::Configure(configuration) => configure(machine, configuration),
             Request::Drives { on } => machine.order(Order::Drives { on }),
@@ -120,7 +129,7 @@ impl Session {
 
     /// Refuses while commands for the previous job are queued.
     #[inline(never)]
-    fn job_begin(
+    pub(super) fn job_begin(
         &mut self,
         machine: &mut impl Machine,
         header: &Header,
@@ -137,7 +146,9 @@ impl Session {
             return Err(beyond(excess));
         }
         self.commanded = false;
+        self.spindle = SpindleOrder::OFF;
         let upload = Upload::begin(machine, header, words, digest)?;
+        self.forget_places(machine);
         self.job = (header.axes.is_some() && !upload.is_streamed()).then(|| job_mark(header, digest));
         self.upload = Some(upload);
         self.is_outdated = false;
@@ -147,19 +158,25 @@ impl Session {
     }
 
     #[inline(never)]
-    fn job_end(&mut self, machine: &mut impl Machine) -> Result<(), Reason> {
-        let upload = self.upload.ok_or(Reason::NoUpload)?;
+    pub(super) fn job_end(&mut self, machine: &mut impl Machine) -> Result<(), Reason> {
+        let upload = self.upload.as_ref().ok_or(Reason::NoUpload)?;
         if upload.is_streamed() {
             return upload.finish(machine);
         }
         upload.check_complete()?;
+        let finished = upload.finish(machine);
         self.upload = None;
-        upload.finish(machine)
+        finished
     }
 
-    /// Queues a command if the state permits it. `pass`: the one that a start begins with.
+    /// Queues a command if the state permits it. `start`: where a start begins.
     #[inline(never)]
-    fn operate(&mut self, machine: &mut impl Machine, command: Command, pass: u32) -> Result<(), Reason> {
+    pub(super) fn operate(
+        &mut self,
+        machine: &mut impl Machine,
+        command: Command,
+        start: RunStart,
+    ) -> Result<(), Reason> {
         let ends = matches!(
             command,
             Command::Hold | Command::Stop | Command::Abort | Command::Pause
@@ -179,17 +196,17 @@ impl Session {
                 return Err(Reason::OtherProfile);
             }
             machine.may_start()?;
-            if pass > 0 {
-                machine.order(Order::BeginAt(pass))?;
+            if !start.is_first() {
+                machine.order(Order::BeginAt(start))?;
             }
         }
         let sent = instruct(machine, Instruction::Command(command));
-        if sent.is_err() && pass > 0 {
-            machine.order(Order::BeginAt(0))?;
+        if sent.is_err() && !start.is_first() {
+            machine.order(Order::BeginAt(RunStart::FIRST))?;
         }
         sent?;
         if command == Command::Start {
-            self.journal_start(machine, pass);
+            self.journal_start(machine, start);
         }
         self.commanded = true;
         Ok(())
@@ -210,12 +227,15 @@ const fn needs_rest(request: &Request) -> bool {
         request,
         Request::JobBegin { .. }
             | Request::Start
-            | Request::StartAt { .. }
+            | Request::StartAt(_)
             | Request::Clock(_)
             | Request::StepConfig(_)
             | Request::SetProfile(_)
             | Request::SetOffsets(_)
             | Request::Spindle(_)
+            | Request::StoreJob { .. }
+            | Request::DeleteJob { .. }
+            | Request::StartJob { .. }
     )
 }
 

@@ -61,20 +61,20 @@ impl NorFlash for Failing {
 }
 
 fn read(flash: &RamFlash<SECTOR>) -> Option<Vec<u8>> {
-    let found = Storage::<_, SLOT>::open(flash.clone()).newest(Kind::Profile);
+    let found = Storage::open(flash.clone()).newest(Kind::Profile);
     found.map(|payload| payload.bytes().to_vec())
 }
 
 #[test]
 fn the_newest_record_is_in_force() {
-    let mut storage = Storage::<_, SLOT>::open(RamFlash::<SECTOR>::new());
+    let mut storage = Storage::open(RamFlash::<SECTOR>::new());
     assert!(storage.newest(Kind::Profile).is_none());
     for length in 0..3 * SLOTS {
         let payload: Vec<u8> = (0..length as u8).collect();
         storage.keep(Kind::Profile, &payload).unwrap();
         assert_eq!(storage.newest(Kind::Profile).unwrap().bytes(), payload);
         // At a power-up in between.
-        storage = Storage::<_, SLOT>::open(storage.flash);
+        storage = Storage::open(storage.flash);
         assert_eq!(storage.newest(Kind::Profile).unwrap().bytes(), payload);
     }
     assert_eq!(
@@ -86,7 +86,7 @@ fn the_newest_record_is_in_force() {
 
 #[test]
 fn without_a_power_up_there_is_room_for_two_sectors() {
-    let mut storage = Storage::<_, SLOT>::open(RamFlash::<SECTOR>::new());
+    let mut storage = Storage::open(RamFlash::<SECTOR>::new());
     for record in 0..2 * SLOTS {
         storage.keep(Kind::Profile, &[record as u8]).unwrap();
     }
@@ -95,7 +95,7 @@ fn without_a_power_up_there_is_room_for_two_sectors() {
         storage.newest(Kind::Profile).unwrap().bytes(),
         [2 * SLOTS as u8 - 1]
     );
-    let mut storage = Storage::<_, SLOT>::open(storage.flash);
+    let mut storage = Storage::open(storage.flash);
     storage.keep(Kind::Profile, &[99]).unwrap();
     assert_eq!(storage.newest(Kind::Profile).unwrap().bytes(), [99]);
 }
@@ -103,8 +103,8 @@ fn without_a_power_up_there_is_room_for_two_sectors() {
 #[test]
 fn what_else_was_in_the_sectors_is_erased() {
     let mut flash = RamFlash::<SECTOR>::new();
-    flash.write(700, &[0; 900]).unwrap();
-    let mut storage = Storage::<_, SLOT>::open(flash);
+    flash.write(100, &[0; 200]).unwrap();
+    let mut storage = Storage::open(flash);
     for record in 0..SLOTS as u8 {
         storage.keep(Kind::Profile, &[record]).unwrap();
     }
@@ -129,7 +129,7 @@ fn a_power_cut_at_any_operation_loses_nothing_that_was_kept() {
             let mut was_cut = false;
             // There is always room for a sector of records, whatever the last power-up left.
             'life: for turn in 0..5_u8 {
-                let mut storage = Storage::<_, SLOT>::open(failing);
+                let mut storage = Storage::open(failing);
                 for record in 0..SLOTS as u8 - turn % 2 {
                     let payload = [turn, record, 0x55];
                     tried = Some(payload.to_vec());
@@ -146,7 +146,7 @@ fn a_power_cut_at_any_operation_loses_nothing_that_was_kept() {
             let found = read(&flash);
             assert!(found == kept || found == tried, "{left}: {found:?}, not {kept:?}");
             // The supply is back, also if the cut was in an erase.
-            let mut storage = Storage::<_, SLOT>::open(flash);
+            let mut storage = Storage::open(flash);
             storage.keep(Kind::Profile, &[7; 40]).unwrap();
             assert_eq!(read(&storage.flash), Some([7; 40].to_vec()));
             if !was_cut {
@@ -156,4 +156,27 @@ fn a_power_cut_at_any_operation_loses_nothing_that_was_kept() {
         }
     }
     assert!(cuts > 1000, "{cuts}");
+}
+
+/// Records of several slots between records of one: each is found, and a record that was prepared counts once it is written, whatever was written beside it.
+#[test]
+fn long_and_prepared_records_are_found() {
+    const LARGE: usize = 40 * SLOT;
+    let mut storage = Storage::open(RamFlash::<LARGE>::new());
+    let long: Vec<u8> = (0..PAYLOAD_MAX as u8).collect();
+    storage.keep(Kind::Profile, &long).unwrap();
+    for number in 0..60_u8 {
+        let prepared = storage.prepare(Kind::Journal, &[number, 1]).unwrap();
+        storage.keep(Kind::Journal, &[number, 0]).unwrap();
+        if number % 3 == 0 {
+            storage.flash.write(prepared.offset, &prepared.bytes).unwrap();
+            storage.look_again();
+        }
+        let found = storage.newest(Kind::Journal).unwrap();
+        assert_eq!(found.bytes(), [number, u8::from(number % 3 == 0)]);
+        assert_eq!(storage.newest(Kind::Profile).unwrap().bytes(), long);
+        storage = Storage::open(storage.flash);
+        assert_eq!(storage.newest(Kind::Journal).unwrap().bytes(), found.bytes());
+        assert_eq!(storage.newest(Kind::Profile).unwrap().bytes(), long);
+    }
 }

@@ -17,5 +17,7 @@ pub(crate) mod sample_timer;
 pub(crate) mod speed_output;
 #[path = "../../src/drivers/step_output.rs"]
 pub(crate) mod step_output;
+#[path = "../../src/drivers/supply.rs"]
+pub(crate) mod supply;
 #[path = "../../src/drivers/watchdog.rs"]
 pub(crate) mod watchdog;

@@ -12,7 +12,7 @@ use stm32f4xx_hal::{
 use super::{BOARD, Board, take_reset_cause};
 use crate::{
     design_parameters::{PERIOD_US, SERIAL_BAUD},
-    drivers::{gpio, settings_flash::sectors},
+    drivers::{flash::sectors, gpio},
 };
 
 /// The processor's clock, MHz: the chip's maximum.
@@ -87,7 +87,9 @@ pub(crate) fn init(device: pac::Peripherals) -> Board {
     device.DBGMCU.apb2_fz().modify(|_, w| w.dbg_tim1_stop().set_bit());
 
     begin_speed_output(&device.TIM12);
-    let (settings, journal) = sectors(device.FLASH);
+    pac::PWR::enable(&mut rcc);
+    watch_supply(&device.PWR, &device.EXTI);
+    let (settings, jobs, falling) = sectors(device.FLASH);
 
     Board {
         tim1: device.TIM1,
@@ -97,15 +99,46 @@ pub(crate) fn init(device: pac::Peripherals) -> Board {
         usart1: device.USART1,
         iwdg: device.IWDG,
         settings,
-        journal,
+        jobs,
+        falling,
         reset,
     }
 }
 
+/// Settings, journal and jobs are kept in the chip's flash.
+pub(crate) use crate::drivers::flash::{JobFlash, SettingsFlash};
+pub(crate) type FallingFlash = SettingsFlash;
+pub(crate) const HAS_JOURNAL: bool = true;
 /// The safety inputs are pins.
 pub(crate) use crate::drivers::gpio::Ports as InputPorts;
-/// Settings are kept in the chip's flash.
-pub(crate) use crate::drivers::settings_flash::{JournalFlash, SettingsFlash};
+
+/// The line of the voltage detector in the interrupt controller, and its output.
+const PVD_LINE: u32 = 1 << 16;
+const PVDO: u32 = 1 << 2;
+
+/// Has the voltage detector interrupt at 2.9 V, its highest level, falling and rising.
+#[allow(unsafe_code, reason = "whole registers are written")]
+fn watch_supply(power: &pac::PWR, lines: &pac::EXTI) {
+    const PVDE: u32 = 1 << 4;
+    const PLS: u32 = 0b111 << 5;
+    // SAFETY: values of the reference manual (5.4.1, 12.3).
+    unsafe {
+        power.cr().modify(|r, w| w.bits(r.bits() | PVDE | PLS));
+        lines.rtsr().modify(|r, w| w.bits(r.bits() | PVD_LINE));
+        lines.ftsr().modify(|r, w| w.bits(r.bits() | PVD_LINE));
+        lines.imr().modify(|r, w| w.bits(r.bits() | PVD_LINE));
+    }
+}
+
+/// Takes the detector's interrupt back; whether the voltage is low.
+#[allow(unsafe_code, reason = "registers are read by their address")]
+pub(crate) fn supply_is_low() -> bool {
+    // SAFETY: nothing else uses this line, or writes these registers after the start.
+    unsafe {
+        (*pac::EXTI::ptr()).pr().write(|w| w.bits(PVD_LINE));
+        (*pac::PWR::ptr()).csr().read().bits() & PVDO != 0
+    }
+}
 
 /// This board has pins of its own.
 pub(crate) fn simulate(_lines: InputLines) -> bool {

@@ -15,7 +15,9 @@
 //! | `SERIAL_DIVIDER` | `BRR` of USART1 |
 //! | `init` | sets up the clocks; returns the peripherals for the drivers |
 //! | `InputPorts` | source of the safety inputs: the chip's ports, or simulated ones |
-//! | `SettingsFlash`, `JournalFlash` | where settings and the journal are kept |
+//! | `SettingsFlash`, `JobFlash`, `FallingFlash` | where settings with the journal are kept, jobs, and the record of a failing supply |
+//! | `HAS_JOURNAL` | the journal outlives the power |
+//! | `supply_is_low` | acknowledges the voltage detector's interrupt; whether the voltage is low |
 //! | `simulate` | sets the simulated inputs of a board without pins |
 //! | `stop_for_good` | final state after a processor fault |
 //!
@@ -40,16 +42,16 @@ compile_error!("choose one board: `cargo fw-qemu`, `cargo fw-chip` or `cargo fw-
 mod qemu;
 #[cfg(feature = "board-qemu")]
 pub(crate) use qemu::{
-    BOARD, InputPorts, JournalFlash, SERIAL_DIVIDER, STEP_TIMER_HZ, SettingsFlash, TIME_IS_SIMULATED,
-    TIMER_HZ, TIMER_RELOAD, init, simulate, stop_for_good,
+    BOARD, FallingFlash, HAS_JOURNAL, InputPorts, JobFlash, SERIAL_DIVIDER, STEP_TIMER_HZ, SettingsFlash,
+    TIME_IS_SIMULATED, TIMER_HZ, TIMER_RELOAD, init, simulate, stop_for_good, supply_is_low,
 };
 
 #[cfg(not(feature = "board-qemu"))]
 mod chip;
 #[cfg(not(feature = "board-qemu"))]
 pub(crate) use chip::{
-    InputPorts, JournalFlash, SERIAL_DIVIDER, STEP_TIMER_HZ, SettingsFlash, TIME_IS_SIMULATED, TIMER_HZ,
-    TIMER_RELOAD, init, simulate, stop_for_good,
+    FallingFlash, HAS_JOURNAL, InputPorts, JobFlash, SERIAL_DIVIDER, STEP_TIMER_HZ, SettingsFlash,
+    TIME_IS_SIMULATED, TIMER_HZ, TIMER_RELOAD, init, simulate, stop_for_good, supply_is_low,
 };
 
 #[cfg(feature = "board-stm32f405")]
@@ -136,8 +138,10 @@ pub(crate) struct Board {
     pub(crate) iwdg: pac::IWDG,
     /// Where settings are kept.
     pub(crate) settings: SettingsFlash,
-    /// Where the journal is kept.
-    pub(crate) journal: JournalFlash,
+    /// Where jobs are kept.
+    pub(crate) jobs: JobFlash,
+    /// Where settings are kept once more, for the record of a failing supply.
+    pub(crate) falling: FallingFlash,
     /// Why the chip started.
     pub(crate) reset: ResetCause,
 }

@@ -61,15 +61,23 @@ pub(crate) fn init(device: pac::Peripherals) -> Board {
         usart1: device.USART1,
         iwdg: device.IWDG,
         settings: SettingsFlash::new(),
-        journal: JournalFlash::new(),
+        jobs: JobFlash::new(),
+        falling: FallingFlash::new(),
         reset: take_reset_cause(&device.RCC),
     }
 }
 
 /// QEMU's flash cannot be written: settings are kept as long as QEMU runs.
 pub(crate) type SettingsFlash = RamFlash<512>;
-/// No journal: nothing survives the end of QEMU.
-pub(crate) type JournalFlash = RamFlash<0>;
+/// No jobs, and no journal: nothing survives the end of QEMU, and RAM is short.
+pub(crate) type JobFlash = RamFlash<0>;
+pub(crate) type FallingFlash = RamFlash<0>;
+pub(crate) const HAS_JOURNAL: bool = false;
+
+/// No voltage detector.
+pub(crate) const fn supply_is_low() -> bool {
+    false
+}
 
 /// Simulated input registers of the ports: the inputs set by the host, initially none.
 static INPUTS: [AtomicU32; Port::ALL.len()] = [const { AtomicU32::new(0) }; Port::ALL.len()];

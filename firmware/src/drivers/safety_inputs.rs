@@ -50,13 +50,16 @@ const fn input_of(role: Role) -> InputLines {
         Role::Probe => 11,
         Role::Door => 12,
         Role::AtSpeed => 13,
+        Role::Start => 14,
         _ => return InputLines::NONE,
     };
     InputLines(1 << number)
 }
 
 const _: () = assert!(
-    input_of(Role::LimitMax(Axis::Z)).0 == 1 << 6 && InputLines::ALL.0 == (1 << 14) - 1,
+    input_of(Role::LimitMax(Axis::Z)).0 == 1 << 6
+        && input_of(Role::Start).0 == InputLines::START.0
+        && InputLines::ALL.0 == u16::MAX,
     "the inputs' bits are those of the protocol"
 );
 

@@ -72,8 +72,8 @@ impl Chip {
             0x4000_1800..0x4000_1c00 => self.pwm.read(address & 0x3ff, world),
             0x4000_3000..0x4000_3400 => self.watchdog.read(address & 0x3ff, world),
             0x4000_7000 => self.rcc.pwr_cr,
-            // PWR_CSR: VOS ready.
-            0x4000_7004 => 1 << 14,
+            0x4000_7004 => self.supply.status(),
+            0x4001_3c00..0x4001_4000 => self.supply.read(address & 0x3ff, world),
             0x4001_0000..0x4001_0400 => self.tim1.read(address & 0x3ff, world),
             0x4001_1000..0x4001_1400 => self.usart.read(address & 0x3ff, world),
             0x4002_0000..0x4002_2400 => {
@@ -123,6 +123,7 @@ impl Chip {
                     .write(address & 0x3ff, value, self.rcc.timer_cycles(2), world)
             }
             0x4001_1000..0x4001_1400 => self.usart.write(address & 0x3ff, value, apb2, world),
+            0x4001_3c00..0x4001_4000 => self.supply.write(address & 0x3ff, value, world),
             0x4002_0000..0x4002_2400 => {
                 let index = (address as usize - 0x4002_0000) / 0x400;
                 if self.ports[index].write(address & 0x3ff, value, world) {

@@ -21,6 +21,7 @@ use crate::{
         nvic::{self, Nvic},
         pwm::Pwm,
         rcc::{Rcc, cause},
+        supply::Supply,
         timer::{self, Timer},
         usart::Usart,
         watchdog::Watchdog,
@@ -66,6 +67,7 @@ pub(crate) struct Chip {
     pub(crate) watchdog: Watchdog,
     pub(crate) debug: Debug,
     pub(crate) flash: Flash,
+    pub(crate) supply: Supply,
     line: Option<Line>,
     /// The machine around the board, and the last levels of the step pins.
     pub(crate) machine: Option<Machine>,
@@ -76,6 +78,7 @@ pub(crate) struct Chip {
     serial_asks: bool,
     script: Vec<Entry>,
     record: Option<BufWriter<File>>,
+    track: Option<BufWriter<File>>,
     random: fastrand::Rng,
     next_look: u64,
     /// Times of the next event, without and with those of TIM1.
@@ -121,6 +124,12 @@ impl Chip {
             .map(File::create)
             .transpose()
             .map_err(|error| format!("the record: {error}"))?;
+        let track = options
+            .track
+            .as_ref()
+            .map(File::create)
+            .transpose()
+            .map_err(|error| format!("the track: {error}"))?;
         let mut ports = [0, 1, 2, 3, 4, 5, 6, 7, 8].map(|index| Port::new(index, 0, 0));
         for input in script::inputs(board) {
             let port = &mut ports[input.pin.port.index()];
@@ -154,7 +163,8 @@ impl Chip {
             usart: Usart::new(),
             watchdog: Watchdog::new(options.lsi_hz),
             debug: Debug::default(),
-            flash: Flash::new(options.cut_flash_every),
+            flash: Flash::new([options.cut_flash_every, options.cut_erase_every]),
+            supply: Supply::GOOD,
             line,
             machine: options.machine.clone(),
             step_levels: 0,
@@ -162,6 +172,7 @@ impl Chip {
             serial_asks: false,
             script,
             record: record.map(BufWriter::new),
+            track: track.map(BufWriter::new),
             random: fastrand::Rng::with_seed(options.seed),
             next_look: 0,
             next: 0,
@@ -206,6 +217,21 @@ impl Chip {
         self.debug = Debug::default();
         self.flash.restart();
         if flags & cause::POWER_ON != 0 {
+            self.supply = Supply::GOOD;
+        } else {
+            let Supply {
+                drives_off,
+                low_at,
+                fails_at,
+                ..
+            } = self.supply;
+            self.supply = Supply::GOOD;
+            if drives_off {
+                self.supply.fall(low_at, fails_at);
+            }
+        }
+        self.flash.fails_at = self.supply.fails_at;
+        if flags & cause::POWER_ON != 0 {
             self.sram.fill(SRAM_FILL);
         }
         for index in 0..self.ports.len() {
@@ -224,8 +250,14 @@ impl Chip {
     pub(crate) fn keep(&mut self, change: Change) {
         let changed = self.step_levels ^ u32::from(change.levels);
         if usize::from(change.port) == self.step_port {
-            if let Some(machine) = &mut self.machine {
+            if let Some(machine) = self.machine.as_mut().filter(|_| !self.supply.drives_off) {
+                let before = machine.pulses();
                 machine.follow(self.board, &change, self.step_levels, &self.ports);
+                if let Some(track) = self.track.as_mut().filter(|_| machine.pulses() != before) {
+                    let [x, y, z] = machine.at_steps().map(i32::to_le_bytes);
+                    // A failed write is detected by the reader of the record.
+                    let _ = track.write_all(&[&change.at.to_le_bytes()[..], &x, &y, &z].concat());
+                }
             }
             self.step_levels = change.levels.into();
         }
@@ -258,7 +290,7 @@ impl Chip {
     }
 
     pub(crate) fn finish_record(&mut self) {
-        if let Some(record) = &mut self.record {
+        for record in [&mut self.record, &mut self.track].into_iter().flatten() {
             let _ = record.flush();
         }
     }
@@ -289,6 +321,8 @@ impl Chip {
             self.usart.received_at,
             self.watchdog.deadline,
             self.next_look,
+            self.supply.low_at,
+            self.supply.fails_at,
             scripted,
         ]
         .into_iter()
@@ -374,6 +408,14 @@ impl Chip {
             self.world.event(self.happened, "watchdog");
             self.watchdog.deadline = NEVER;
             self.reset = Some(cause::WATCHDOG | cause::PIN);
+        } else if self.supply.low_at == at {
+            if self.supply.becomes_low(self.rcc.pwr_cr, &mut self.world) {
+                self.nvic.raise(nvic::PVD, at);
+            }
+        } else if self.supply.fails_at == at {
+            self.world.event(at, "power cut");
+            self.supply.fails_at = NEVER;
+            self.reset = Some(cause::POWER_ON | cause::PIN | cause::BROWN_OUT);
         } else if self.next_look == at {
             self.look(at);
         } else if let Some(index) = self
@@ -400,6 +442,7 @@ impl Chip {
     pub(crate) fn returned(&mut self, line: Option<usize>) {
         let asks = match line {
             Some(nvic::USART1) => self.usart.interrupts(),
+            Some(nvic::PVD) => self.supply.interrupts(),
             Some(nvic::TIM2) => self.tim2.status & self.tim2.dier & timer::UPDATE != 0,
             _ => false,
         };
@@ -424,8 +467,30 @@ impl Chip {
             }
             Event::Hang => self.hangs = true,
             Event::Fault => self.fault = true,
+            Event::Power { lag_s, holds_s } => {
+                let low_at = self.world.now + self.world.lasting(lag_s);
+                let fails_at = low_at + self.world.lasting(holds_s);
+                self.supply.fall(low_at, fails_at);
+                self.flash.fails_at = fails_at;
+            }
             Event::BrownOut => self.reset = Some(cause::BROWN_OUT | cause::PIN),
         }
+    }
+
+    /// An event by standard input.
+    fn typed(&self, line: &str) -> Result<Entry, String> {
+        if !line.contains(':') {
+            return Ok(Entry {
+                name: line.to_owned(),
+                when: When::Start(self.world.seconds(self.happened)),
+                what: script::event(line, self.board)?,
+            });
+        }
+        let mut entry = script::entry(line, self.board)?;
+        if let When::Pulses(count) = &mut entry.when {
+            *count += self.machine.as_ref().map_or(0, Machine::pulses);
+        }
+        Ok(entry)
     }
 
     /// Polls for bytes of the host, and keeps pace with real time.
@@ -437,12 +502,12 @@ impl Chip {
             self.usart.begin(at, self.rcc.apb2_cycles());
         }
         for line in self.options.typed() {
-            match script::event(&line, self.board) {
-                Ok(event) => {
-                    self.world.event(at, &line);
-                    self.scripted(event);
+            match self.typed(&line) {
+                Ok(entry) => {
+                    self.script.push(entry);
+                    self.plan();
                 }
-                Err(why) => self.world.note(why),
+                Err(why) => self.world.wrong(why),
             }
         }
         let seconds = self.world.seconds(at);

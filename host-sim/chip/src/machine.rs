@@ -130,6 +130,11 @@ impl Machine {
         self.pulses
     }
 
+    /// Where the carriages are, steps.
+    pub(crate) fn at_steps(&self) -> [i32; 3] {
+        self.steps.map(|steps| i32::try_from(steps).unwrap_or(i32::MAX))
+    }
+
     /// Where the carriages are, mm.
     pub(crate) fn at_mm(&self) -> [f64; 3] {
         std::array::from_fn(|axis| self.steps[axis] as f64 / self.steps_per_mm[axis])

@@ -1,4 +1,4 @@
-//! Scripted events: inputs that open and close, a processor that hangs or faults, a brown-out.
+//! Scripted events: inputs that open and close, a processor that hangs or faults, a brown-out, a supply that falls.
 
 use boards::{Axis, Board, Line, Role};
 
@@ -15,6 +15,9 @@ pub(crate) enum Event {
     Fault,
     /// The supply falls below the brown-out threshold and recovers immediately.
     BrownOut,
+    /// The supply falls: the drives let go, after `lag_s` the voltage detector's level is reached, and `holds_s` later the chip is without supply, which then
+    /// comes back.
+    Power { lag_s: f64, holds_s: f64 },
 }
 
 /// Time of an event, seconds.
@@ -44,6 +47,7 @@ pub(crate) fn input_of(role: Role) -> Option<&'static str> {
         Role::Probe => "probe",
         Role::Door => "door",
         Role::AtSpeed => "at-speed",
+        Role::Start => "start",
         Role::LimitMin(Axis::X) => "x-min",
         Role::LimitMin(Axis::Y) => "y-min",
         Role::LimitMin(Axis::Z) => "z-min",
@@ -64,10 +68,6 @@ pub(crate) fn entry(text: &str, board: &Board) -> Result<Entry, String> {
     let (when, what) = text
         .split_once(':')
         .ok_or("an event is TIME:WHAT, such as motion+20:emergency-stop")?;
-    let ms = |text: &str| {
-        text.parse::<f64>()
-            .map_err(|_| format!("{text}: not a time in ms"))
-    };
     let when = match (when.strip_prefix("motion+"), when.strip_prefix("pulses+")) {
         (Some(after), _) => When::Motion(ms(after)? / 1e3),
         (_, Some(count)) => When::Pulses(
@@ -84,6 +84,10 @@ pub(crate) fn entry(text: &str, board: &Board) -> Result<Entry, String> {
     })
 }
 
+fn ms(text: &str) -> Result<f64, String> {
+    text.parse().map_err(|_| format!("{text}: not a time in ms"))
+}
+
 /// Reads what happens.
 pub(crate) fn event(what: &str, board: &Board) -> Result<Event, String> {
     let (what, closed) = what
@@ -94,11 +98,21 @@ pub(crate) fn event(what: &str, board: &Board) -> Result<Event, String> {
         "stall" => Event::Stall(!closed),
         "fault" => Event::Fault,
         "brown-out" => Event::BrownOut,
+        power if power.starts_with("power=") => {
+            let (lag, holds) = power
+                .trim_start_matches("power=")
+                .split_once(',')
+                .ok_or_else(|| format!("{power}: power=MS,MS is expected"))?;
+            Event::Power {
+                lag_s: ms(lag)? / 1e3,
+                holds_s: ms(holds)? / 1e3,
+            }
+        }
         input => {
             let line = inputs(board)
                 .find(|line| input_of(line.role) == Some(input))
                 .ok_or_else(|| {
-                    format!("{input}: neither an input of the board nor stall, hang, fault, brown-out")
+                    format!("{input}: neither an input of the board nor stall, hang, fault, brown-out, power=MS,MS")
                 })?;
             Event::Input {
                 role: line.role,

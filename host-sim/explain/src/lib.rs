@@ -302,6 +302,9 @@ mod tests {
             Reason::WholeOnly,
             Reason::SpindleTurns,
             Reason::NoFeed,
+            Reason::NoStoredJob,
+            Reason::NoRoom { words: 7 },
+            Reason::NothingToResume,
         ]
     }
 

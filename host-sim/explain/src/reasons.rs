@@ -3,7 +3,7 @@
 use super::{Entry, Family};
 
 /// In the order of codes.
-pub(super) const ENTRIES: [Entry; 35] = [
+pub(super) const ENTRIES: [Entry; 38] = [
     reason(
         0,
         "bad-frame",
@@ -318,6 +318,33 @@ pub(super) const ENTRIES: [Entry; 35] = [
         "The override that was set last holds for jogs too.",
         "`cargo sim operate --port DEV override 100`.",
         "`operate jog x+10` after `operate override 0`.",
+    ),
+    reason(
+        35,
+        "no-stored-job",
+        "The board keeps no job of this name.",
+        "None.",
+        "It was not stored, or deleted since; a job whose storing was cut short is not kept.",
+        "List the jobs: `cargo sim operate jobs`; store one: `cargo sim run JOB --store NAME`.",
+        "`operate start left` on a board that keeps a job named Left.",
+    ),
+    reason(
+        36,
+        "no-room",
+        "The flash of the board has no room for the job.",
+        "Words of the longest job for which there is room.",
+        "Two sectors of 128 KB keep jobs. The place of a deleted job is free again once its sector keeps none, at the next power-up.",
+        "Delete jobs (`cargo sim operate delete NAME`), and switch the board off and on.",
+        "A twentieth job of 13 kB.",
+    ),
+    reason(
+        37,
+        "nothing-to-resume",
+        "The last run was not one of this job, or came to its end.",
+        "None.",
+        "A run goes on only with the job and the machine profile that it was begun with.",
+        "Start the job from its beginning.",
+        "`operate start part --resume` after a run that has finished.",
     ),
 ];
 

@@ -2,7 +2,8 @@
 
 use interp_core::steps::BUFFER_WORDS;
 use interp_core::{
-    Command, Fault, Inputs, Interpolator, STORE_WORDS, Sample, SpanParameter, State, Steps, SurfacePoint,
+    Command, Fault, Inputs, Interpolator, RunStart, STORE_WORDS, Sample, SpanParameter, State, Steps,
+    SurfacePoint,
 };
 
 use crate::prepare::Prepared;
@@ -12,7 +13,7 @@ use crate::prepare::Prepared;
 pub struct Machine {
     core: Box<Interpolator<Vec<i32>>>,
     steps: Option<(Steps, Box<[u32; BUFFER_WORDS]>)>,
-    first_pass: u32,
+    start: RunStart,
 }
 
 impl Machine {
@@ -40,11 +41,11 @@ impl Machine {
         Ok(Self {
             core,
             steps,
-            first_pass: job.first_pass,
+            start: job.start,
         })
     }
 
-    /// Runs the job from the beginning of its first pass, and calls `each` with every sample, until its end or a fault. Stops early and returns
+    /// Runs the job from where it is to begin, and calls `each` with every sample, until its end or a fault. Stops early and returns
     /// `Ok` when `each` returns `false`.
     ///
     /// # Errors
@@ -52,7 +53,7 @@ impl Machine {
     pub fn run(&mut self, mut each: impl FnMut(&Sample) -> bool) -> Result<(), Fault> {
         // A fault of the run before is acknowledged by an abort; otherwise it is ignored.
         self.core.tick(Command::Abort);
-        self.core.begin_at(self.first_pass);
+        self.core.begin_at(self.start);
         let mut command = Some(Command::Start);
         let mut pass = None;
         let has_limits = self.core.has_limits();

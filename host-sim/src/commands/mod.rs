@@ -34,6 +34,7 @@ mod scripted;
 mod settings;
 mod simulate;
 mod spindle;
+mod stored;
 mod swept_words;
 mod typed;
 mod verify;

@@ -6,7 +6,7 @@ use protocol::message::{OVERRIDE_MAX_PERCENT, Request, Status};
 use serde_json::json;
 
 use super::out::{say, to_stderr};
-use super::{Failure, Result, attach, axes, home, run, spindle};
+use super::{Failure, Result, attach, axes, home, run, spindle, stored};
 use machine::remote::operate::{act, sentences};
 
 /// Switches a board's drives, homes and jogs its axes, touches off, holds, resumes or stops its run, follows it, and prints its state.
@@ -17,6 +17,7 @@ use machine::remote::operate::{act, sentences};
 /// Example: cargo sim operate --port /dev/ttyUSB0 spindle 12000
 /// Example: cargo sim operate --port /dev/ttyUSB0 touch z-30 --work 1 --plate 15 --radius 3
 /// Example: cargo sim operate --port /dev/ttyUSB0 attach
+/// Example: cargo sim operate --port /dev/ttyUSB0 start left
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {
@@ -36,6 +37,8 @@ enum Action {
     Attach,
     #[command(flatten)]
     Axes(axes::Action),
+    #[command(flatten)]
+    Stored(stored::Action),
     #[command(flatten)]
     Command(OperatorCommand),
 }
@@ -187,6 +190,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let command = match &arguments.action {
         Action::Attach => return attach::to_port(port, None, arguments.json),
         Action::Axes(action) => return axes::command(action, port, arguments.json),
+        Action::Stored(action) => return stored::command(action, port, arguments.json),
         Action::Command(command) => command,
     };
     let mut session = run::open_port(port)?;

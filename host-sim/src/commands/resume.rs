@@ -1,5 +1,6 @@
-//! Where `run --resume` goes on: at the first pass that the board's journal does not report as complete.
+//! Where `run --resume` goes on: behind what the board's journal reports as complete.
 
+use interp_core::RunStart;
 use machine::prepare::Prepared;
 use machine::remote::Session;
 use protocol::digest::job_digest;
@@ -32,8 +33,8 @@ const fn hindrance(journal: Option<&Journal>, job: u64, profile: u32) -> Option<
     })
 }
 
-/// The pass with which the board is to go on with this job.
-pub(super) fn first_pass(session: &mut Session, prepared: &Prepared) -> Result<u32> {
+/// Where the board is to go on with this job.
+pub(super) fn start(session: &mut Session, prepared: &Prepared) -> Result<RunStart> {
     let journal = session.journal()?;
     let profile = session.status()?.profile;
     let job = job_mark(&prepared.header, job_digest(&prepared.words));
@@ -42,7 +43,22 @@ pub(super) fn first_pass(session: &mut Session, prepared: &Prepared) -> Result<u
             "there is nothing to resume: {what}\n  help: {remedy}"
         ))));
     }
-    Ok(journal.map_or(0, |journal| journal.pass))
+    Ok(journal.map_or(RunStart::FIRST, |journal| journal.start()))
+}
+
+/// The place in words.
+pub(super) fn words(start: RunStart) -> String {
+    match start.within() {
+        None => format!("at the start of pass {}", start.pass),
+        Some(path) => {
+            let fraction = path.fraction as f64 / (u64::MAX as f64);
+            let at = f64::from(path.span) + fraction;
+            format!(
+                "within pass {}, at path parameter {at:.4} (spans from 0)",
+                start.pass
+            )
+        }
+    }
 }
 
 #[cfg(test)]
@@ -56,6 +72,7 @@ mod tests {
             profile: 2,
             pass: 3,
             is_finished: false,
+            path: interp_core::SpanParameter::NONE,
         };
         let ended = Journal {
             is_finished: true,

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use interp_core::FaultKind;
-use protocol::message::Request;
+use protocol::message::{JobName, Request};
 use serde_json::{Value, json};
 
 use super::flash::board_parser;
@@ -43,6 +43,7 @@ use machine::travel;
 /// Example: cargo sim run jobs/plate_machine.toml --port /dev/ttyUSB0 --home 40,30,40
 /// Example: cargo sim run part.toml --port /dev/ttyUSB0 --work 1
 /// Example: cargo sim run part.toml --port /dev/ttyUSB0 --work 1 --resume
+/// Example: cargo sim run part.toml --port /dev/ttyUSB0 --work 1 --store left
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {
@@ -78,9 +79,12 @@ pub(super) struct Arguments {
     work: Option<u8>,
     #[command(flatten)]
     placed: home::Placed,
-    /// Goes on with the run of this job that a power cut, a fault or an abort has ended, at the beginning of the pass that was not complete. The axes have to be homed.
+    /// Goes on with the run of this job that a power cut, a fault or an abort has ended, behind what the board has journalled as complete. The axes have to be homed.
     #[arg(long, requires = "port")]
     resume: bool,
+    /// Stores the job on the board by this name, and does not run it: `operate start NAME` or the start button does. A job without `home_mm` then begins where the axes stand.
+    #[arg(long, value_name = "NAME", requires = "port", value_parser = super::stored::name, conflicts_with_all = ["resume", "report", "trace", "script"])]
+    store: Option<JobName>,
     /// Applies the operator commands in this file, in lockstep: lines `tick N: hold`, or pause, resume, stop, abort, start, override P.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["port", "report", "trace"])]
     script: Option<PathBuf>,
@@ -203,10 +207,14 @@ fn agree(arguments: &Arguments, given: &MachineProfile, session: &mut Session) -
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let jobs = job_file::jobs_of(&arguments.job)?;
     let several = jobs.len() > 1;
-    if several && (arguments.trace.is_some() || arguments.script.is_some() || arguments.resume) {
+    let is_for_one = arguments.trace.is_some()
+        || arguments.script.is_some()
+        || arguments.resume
+        || arguments.store.is_some();
+    if several && is_for_one {
         return Err(Failure::input(
             format!(
-                "the job has {} faces, --trace, --script and --resume are for one",
+                "the job has {} faces, --trace, --script, --resume and --store are for one",
                 jobs.len()
             ),
             format!("name the face: {}", jobs[0].display()),
@@ -260,9 +268,12 @@ fn run_job(arguments: &Arguments, path: &Path, several: bool, bench: &mut Bench)
     let (profile, origin) = (bench.profile, bench.origin);
     let (job, mut prepared) = home::load(path, profile.as_ref(), origin, bench.stands)?;
     if let (true, Some((_, session))) = (arguments.resume, &mut bench.connected) {
-        prepared.first_pass = resume::first_pass(session, &prepared)?;
+        prepared.start = resume::start(session, &prepared)?;
     }
     travel::check(&job)?;
+    if let Some(name) = &arguments.store {
+        return store(arguments, path, (&job, &prepared), name, bench);
+    }
     let folder = arguments.report.as_ref().map(|folder| match several {
         true => folder.join(path.file_name().unwrap_or(path.as_os_str())),
         false => folder.clone(),
@@ -307,9 +318,7 @@ fn run_job(arguments: &Arguments, path: &Path, several: bool, bench: &mut Bench)
     let bar = progress(prepared.words.len() as u64, "uploading");
     drive::upload(session, &prepared, |words| bar.set_position(words as u64))?;
     bar.finish_and_clear();
-    if job.machine.spindle.is_some() && profile.is_some_and(|profile| profile.spindle.is_some()) {
-        session.command(&Request::Spindle(profile::spindle_order(job.machine.spindle)))?;
-    }
+    order_spindle(&job, profile.as_ref(), session)?;
     let reference = Reference {
         job: &job,
         prepared: &prepared,
@@ -351,7 +360,7 @@ fn run_job(arguments: &Arguments, path: &Path, several: bool, bench: &mut Bench)
             );
         }
         if arguments.resume {
-            say!("  resumed      at pass {}", prepared.first_pass);
+            say!("  resumed      {}", resume::words(prepared.start));
         }
         outcome.print(page.as_deref());
         let (speed, missed) = (run.ticks_per_second.round(), run.status.deadline_misses);
@@ -363,6 +372,43 @@ fn run_job(arguments: &Arguments, path: &Path, several: bool, bench: &mut Bench)
         print_line(&run);
     }
     Ok(Ran { value, failure })
+}
+
+/// Stores the job on the board.
+fn store(
+    arguments: &Arguments,
+    path: &Path,
+    (job, prepared): (&Job, &Prepared),
+    name: &JobName,
+    bench: &mut Bench,
+) -> Result<Ran> {
+    let profile = bench.profile;
+    let begins_anywhere = super::read_job(path, profile.as_ref())?.machine.home_mm.is_none();
+    let session = session_of(arguments, bench)?;
+    check_period(job, session)?;
+    drive::upload(session, prepared, |_| {})?;
+    order_spindle(job, profile.as_ref(), session)?;
+    session.command(&Request::StoreJob {
+        name: name.clone(),
+        begins_anywhere,
+    })?;
+    let value = json!({ "stored": name.as_str(), "bytes": prepared.bytes() });
+    if !arguments.json {
+        say!(
+            "{} is stored as {name}, {} bytes",
+            path.display(),
+            prepared.bytes()
+        );
+    }
+    Ok(Ran { value, failure: None })
+}
+
+/// Gives the board the job's spindle and coolant, if it switches them.
+fn order_spindle(job: &Job, profile: Option<&MachineProfile>, session: &mut Session) -> Result<()> {
+    if job.machine.spindle.is_some() && profile.is_some_and(|profile| profile.spindle.is_some()) {
+        session.command(&Request::Spindle(profile::spindle_order(job.machine.spindle)))?;
+    }
+    Ok(())
 }
 
 /// The session with the board: begun with the first job. A simulated board takes the profile.

@@ -57,6 +57,26 @@ impl Route {
         Self::whole(side, reversed, header.path_spans)
     }
 
+    /// Whether a path parameter is between start and end.
+    pub(crate) fn is_within(&self, path: SpanParameter) -> bool {
+        let [start, end] = self.ends;
+        if self.reversed {
+            start > path && path > end
+        } else {
+            start < path && path < end
+        }
+    }
+
+    /// Begins at this path parameter instead.
+    pub(crate) const fn begin_at(&mut self, path: SpanParameter) {
+        let [_, end] = self.ends;
+        self.ends = [path, end];
+        if let Some(front) = &mut self.front {
+            let [_, ends_on] = front.are_on_boundary;
+            front.are_on_boundary = [false, ends_on];
+        }
+    }
+
     /// A fraction in the direction of travel, from one in the surface's own direction, or back.
     pub(crate) const fn turned(&self, fraction: u64) -> u64 {
         if self.reversed { !fraction } else { fraction }

@@ -88,6 +88,7 @@ impl Run {
             (planning, false) => *planning = PassPlanning::SCAN,
         }
         self.travel = Travel::START;
+        self.first_offset = [0; 3];
         self.last_interval = f32::INFINITY;
         self.step_over = None;
         self.next_route = None;
@@ -197,6 +198,11 @@ impl Run {
         self.last_feed_factor = 0.0;
         self.describe(0.0, last);
         Ok(())
+    }
+
+    /// The first sample of the pass lies within the surface: the next pass begins elsewhere, and its normal may be any.
+    pub(crate) const fn forget_first(&mut self) {
+        self.first_offset = [0; 3];
     }
 
     /// Prepares the pass that a turn leads to, at its start, without a sample.

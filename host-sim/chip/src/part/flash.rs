@@ -2,7 +2,7 @@
 //!
 //! The processor waits while a byte is written or a sector erased, because it fetches from the same bank. The supply may fail in any of these operations.
 
-use crate::world::World;
+use crate::world::{NEVER, World};
 
 /// First address and bytes of the sectors, and the number of the first.
 pub(crate) const SETTINGS: u32 = 0x0808_0000;
@@ -25,9 +25,9 @@ const MER: u32 = 1 << 2;
 const STRT: u32 = 1 << 16;
 const LOCK: u32 = 1 << 31;
 
-/// Times (DS8626, table 40): a byte, and a sector of 128 KB with a parallelism of eight bits, s.
-const BYTE_S: f64 = 16e-6;
-const ERASE_S: f64 = 2.0;
+/// Times (DS8626, table 40): a byte or a word, and a sector of 128 KB with a parallelism of 8, 16 and 32 bits, s.
+const WRITE_S: f64 = 16e-6;
+const ERASE_S: [f64; 3] = [2.0, 1.3, 1.0];
 
 pub(crate) struct Flash {
     sectors: Vec<u8>,
@@ -35,10 +35,13 @@ pub(crate) struct Flash {
     keys: usize,
     /// A wrong key locks `CR` until the next reset.
     shut: bool,
-    /// The supply fails in every operation of which the number is a multiple of this.
-    cut_every: Option<u64>,
-    /// Bytes written and sectors erased.
+    /// The supply fails in every operation, and in every erase, of which the number is a multiple of these.
+    cut_every: [Option<u64>; 2],
+    /// Time at which the supply fails, cycles.
+    pub(crate) fails_at: u64,
+    /// Bytes or words written, and sectors erased; the sectors alone, begun and erased.
     pub(crate) operations: u64,
+    erases: u64,
     pub(crate) erased: u64,
     /// The supply has failed: nothing is written any more.
     pub(crate) is_cut: bool,
@@ -46,14 +49,16 @@ pub(crate) struct Flash {
 
 impl Flash {
     /// Erased.
-    pub(crate) fn new(cut_every: Option<u64>) -> Self {
+    pub(crate) fn new(cut_every: [Option<u64>; 2]) -> Self {
         Self {
             sectors: vec![0xff; SETTINGS_BYTES as usize],
             cr: LOCK,
             keys: 0,
             shut: false,
             cut_every,
+            fails_at: NEVER,
             operations: 0,
+            erases: 0,
             erased: 0,
             is_cut: false,
         }
@@ -109,13 +114,14 @@ impl Flash {
         }
     }
 
-    /// Counts an operation; false where the supply fails in it.
-    fn holds(&mut self, world: &mut World) -> bool {
+    /// Counts an operation of this duration; false where the supply fails in it. `erases`: the number of erases, in one.
+    fn holds(&mut self, lasts: u64, erases: Option<u64>, world: &mut World) -> bool {
         self.operations += 1;
-        if self
-            .cut_every
-            .is_some_and(|every| self.operations.is_multiple_of(every))
-        {
+        let counts = [Some(self.operations), erases];
+        let mut due = self.cut_every.into_iter().zip(counts);
+        if world.now + lasts > self.fails_at {
+            self.is_cut = true;
+        } else if due.any(|due| matches!(due, (Some(every), Some(count)) if count.is_multiple_of(every))) {
             world.event(world.now, "power cut");
             self.is_cut = true;
         }
@@ -138,12 +144,19 @@ impl Flash {
             return;
         }
         let from = ((sector - FIRST) * SECTOR) as usize;
-        let whole = self.holds(world);
-        // An erase that is cut short has reached a part of the sector.
-        let bytes = if whole { SECTOR } else { SECTOR / 3 } as usize;
-        self.sectors[from..from + bytes].fill(0xff);
+        let lasts = world.lasting(ERASE_S[(self.cr as usize >> 8 & 3).min(2)]);
+        self.erases += 1;
+        let whole = self.holds(lasts, Some(self.erases), world);
+        // An erase that is cut short has reached a part of the sector, of another size each time, from one of its ends.
+        let part = (SECTOR >> (self.erases % 10).max(1)) as usize;
+        let part = match (whole, self.erases.is_multiple_of(2)) {
+            (true, _) => 0..SECTOR as usize,
+            (false, true) => 0..part,
+            (false, false) => part..SECTOR as usize,
+        };
+        self.sectors[from + part.start..from + part.end].fill(0xff);
         self.erased += u64::from(whole);
-        world.now += world.lasting(if whole { ERASE_S } else { ERASE_S / 3.0 });
+        world.now += if whole { lasts } else { lasts / 3 };
     }
 
     /// The word at an address within the sectors.
@@ -152,17 +165,17 @@ impl Flash {
         u32::from_le_bytes([0, 1, 2, 3].map(|byte| self.sectors[at + byte]))
     }
 
-    /// Programs a byte: bits are only cleared.
+    /// Programs a byte or a word, as `PSIZE` says: bits are only cleared.
     pub(crate) fn program(&mut self, address: u32, bytes: u32, value: u32, world: &mut World) {
         if self.is_cut {
             return;
         }
-        // PSIZE 0: bytes.
+        let wanted = 1 << (self.cr >> 8 & 3);
         if self.cr & LOCK != 0
             || self.cr & PG == 0
             || self.cr & SER != 0
-            || bytes != 1
-            || self.cr >> 8 & 3 != 0
+            || bytes != wanted
+            || !address.is_multiple_of(bytes)
         {
             world.wrong(format!(
                 "{bytes} bytes are written to flash at {address:#x} with FLASH_CR = {:#x}",
@@ -170,10 +183,16 @@ impl Flash {
             ));
             return;
         }
-        let whole = self.holds(world);
-        let byte = &mut self.sectors[(address - SETTINGS) as usize];
-        // A byte that is cut short has some of its bits.
-        *byte &= value as u8 | if whole { 0 } else { 0x5a };
-        world.now += world.lasting(BYTE_S);
+        let lasts = world.lasting(WRITE_S);
+        let whole = self.holds(lasts, None, world);
+        let from = (address - SETTINGS) as usize;
+        for (byte, value) in self.sectors[from..from + bytes as usize]
+            .iter_mut()
+            .zip(value.to_le_bytes())
+        {
+            // What is cut short has some of its bits.
+            *byte &= value | if whole { 0 } else { 0x5a };
+        }
+        world.now += lasts;
     }
 }

@@ -7,6 +7,7 @@ pub(crate) mod gpio;
 pub(crate) mod nvic;
 pub(crate) mod pwm;
 pub(crate) mod rcc;
+pub(crate) mod supply;
 pub(crate) mod timer;
 pub(crate) mod usart;
 pub(crate) mod watchdog;

@@ -10,9 +10,10 @@ const PRIORITY: u32 = 0xf0;
 pub(crate) const THREAD: u32 = 256;
 
 /// Interrupts that the models raise.
+pub(crate) const PVD: usize = 1;
 pub(crate) const TIM2: usize = 28;
 pub(crate) const USART1: usize = 37;
-/// Interrupt that the program pends for its planning task; the model of the chip has no EXTI.
+/// Interrupt that the program pends for its planning task; its line of EXTI is not modelled.
 pub(crate) const EXTI0: usize = 6;
 
 /// An exception in progress.

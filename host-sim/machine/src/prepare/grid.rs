@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use interp_core::encode::{self, Bicubic, EncodeError};
 use interp_core::job::SPANS_MAX;
 use interp_core::surface::{Edges, POLYNOMIAL_WORDS, RATIONAL_WORDS};
-use interp_core::{Header, STORE_WORDS, SurfaceKind};
+use interp_core::{Header, RunStart, STORE_WORDS, SurfaceKind};
 
 use job::{Along, Job, JobError, SurfaceSpec};
 use patches::pieces::{Piece, Source};
@@ -282,7 +282,7 @@ fn finish(
     words.extend(widths(job, &path)?);
     words.extend(records);
     Ok(Prepared {
-        first_pass: 0,
+        start: RunStart::FIRST,
         header,
         words,
         path,

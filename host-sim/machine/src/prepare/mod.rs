@@ -14,7 +14,7 @@ mod steps;
 mod stream;
 
 use interp_core::sample::SpanParameter;
-use interp_core::{Header, Pattern, Spacing, StepConfig, SurfaceKind, ToolSide, encode};
+use interp_core::{Header, Pattern, RunStart, Spacing, StepConfig, SurfaceKind, ToolSide, encode};
 
 use job::{Along, AlongChoice, Job, JobError, StartChoice, SurfaceSpec};
 use patches::pieces::Source;
@@ -67,8 +67,8 @@ pub struct Prepared {
     pub along: Along,
     /// Step output, if the job gives one.
     pub steps: Option<StepConfig>,
-    /// The pass with which a run begins: 0, or where a run that was cut short is resumed.
-    pub first_pass: u32,
+    /// Where a run begins: at the start of the job, or where a run that was cut short is resumed.
+    pub start: RunStart,
 }
 
 impl Prepared {
@@ -202,7 +202,7 @@ fn revolved(
     words.extend(widths(job, &path)?);
     words.extend(record.to_words());
     Ok(Prepared {
-        first_pass: 0,
+        start: RunStart::FIRST,
         header: Header { kind, ..header },
         words,
         path,

@@ -45,7 +45,7 @@ pub fn upload(
     mut progress: impl FnMut(usize),
 ) -> Result<(), RemoteError> {
     session.set_feed(None);
-    session.set_first_pass(job.first_pass);
+    session.set_start(job.start);
     let words = u32::try_from(job.words.len()).unwrap_or(u32::MAX);
     let digest = job_digest(&job.words);
     session.command(&Request::JobBegin {
@@ -105,9 +105,11 @@ fn start(session: &mut Session, report: Report, lockstep: Option<u32>) -> Result
         Some(_) => session.set_keep_alive(None),
     }
     session.begin_run()?;
-    session.command(&match session.first_pass() {
-        0 => Request::Start,
-        pass => Request::StartAt { pass },
+    let start = session.start();
+    session.command(&if start.is_first() {
+        Request::Start
+    } else {
+        Request::StartAt(start)
     })?;
     lockstep.map_or(Ok(()), |ticks| session.command(&Request::Run { ticks }))
 }
@@ -190,7 +192,7 @@ pub fn run_digests(
 ) -> Result<Compared, RemoteError> {
     start(session, Report::Digests, lockstep.then_some(u32::MAX))?;
     let mut following = Following::new(session, operator)?;
-    let mut passes = PassCheck::new(expected, session.first_pass());
+    let mut passes = PassCheck::new(expected, session.start().pass);
     loop {
         match following.event(session)? {
             Event::Pass(pass) => {

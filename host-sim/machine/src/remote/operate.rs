@@ -3,7 +3,8 @@
 use std::time::Duration;
 
 use protocol::message::{
-    Configuration, OVERRIDE_NORMAL_PERCENT, PauseCause, Request, SafetyStatus, SpindleOrder, Status, Turning,
+    Configuration, JobName, OVERRIDE_NORMAL_PERCENT, PauseCause, Request, SafetyStatus, SpindleOrder, Status,
+    Turning,
 };
 
 use super::session::{Event, RemoteError, Session};
@@ -201,6 +202,19 @@ pub(super) fn keep_alive(session: &mut Session) -> Result<(), RemoteError> {
     let patience = Duration::from_micros(u64::from(ticks) * u64::from(period_us));
     session.set_keep_alive((ticks > 0).then(|| patience / KEEP_ALIVES));
     Ok(())
+}
+
+/// Starts a job that the board keeps, to be followed in this session.
+///
+/// # Errors
+/// The line breaks, or the board refuses to start it.
+pub fn start_stored(session: &mut Session, name: &JobName, resumes: bool) -> Result<(), RemoteError> {
+    keep_alive(session)?;
+    session.begin_run()?;
+    session.command(&Request::StartJob {
+        name: name.clone(),
+        resumes,
+    })
 }
 
 /// Does it, and says how it is going then.

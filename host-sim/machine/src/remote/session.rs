@@ -6,11 +6,11 @@ use std::time::{Duration, Instant};
 use protocol::frame::{DELIMITER, Decoder, FRAME_MAX, write_request};
 use protocol::message::{
     Capabilities, Clock, Journal, MotionStatus, Offsets, PauseCause, Profile, Reason, Reply, Request, Status,
-    next_number, read_reply,
+    StoredJobInfo, next_number, read_reply,
 };
 use protocol::version::{PROTOCOL_VERSION, VersionMismatch};
 
-use interp_core::State;
+use interp_core::{RunStart, State};
 
 use super::events::Received;
 pub use super::events::{Event, LineLosses};
@@ -121,8 +121,8 @@ pub struct Session {
     tries: u32,
     /// A damaged frame came since the last one.
     is_damaged: bool,
-    /// The pass with which the runs of the loaded job begin.
-    first_pass: u32,
+    /// Where the runs of the loaded job begin.
+    start: RunStart,
     /// Why the board had paused by itself in the last status.
     paused: PauseCause,
 }
@@ -160,8 +160,12 @@ fn name(request: &Request) -> &'static str {
         Request::Turn { .. } => "the spindle",
         Request::Coolant { .. } => "the coolant",
         Request::Pause => "the pause",
-        Request::StartAt { .. } => "the start at a pass",
+        Request::StartAt(_) => "the start at a pass",
         Request::Journal => "the journal",
+        Request::StoreJob { .. } => "to store the job",
+        Request::DeleteJob { .. } => "to delete a stored job",
+        Request::StoredJob { .. } => "the stored jobs",
+        Request::StartJob { .. } => "to start a stored job",
         Request::Offsets | Request::SetOffsets(_) => "the work offsets",
     }
 }
@@ -189,7 +193,7 @@ impl Session {
             feed: None,
             tries: 0,
             is_damaged: false,
-            first_pass: 0,
+            start: RunStart::FIRST,
             paused: PauseCause::None,
         };
         // Terminates a partial frame left by noise or by an earlier host.
@@ -348,13 +352,29 @@ impl Session {
         }
     }
 
-    /// The pass with which the runs of the loaded job begin.
-    pub(super) const fn set_first_pass(&mut self, pass: u32) {
-        self.first_pass = pass;
+    /// The jobs that the board keeps, and the words of the longest for which there is room.
+    ///
+    /// # Errors
+    /// The line breaks.
+    pub fn stored_jobs(&mut self) -> Result<(Vec<StoredJobInfo>, u32), RemoteError> {
+        let mut jobs = Vec::new();
+        loop {
+            let index = u8::try_from(jobs.len()).unwrap_or(u8::MAX);
+            match self.ask(&Request::StoredJob { index })? {
+                Reply::StoredJob { job: Some(job), .. } if index < u8::MAX => jobs.push(job),
+                Reply::StoredJob { room, .. } => return Ok((jobs, room)),
+                _ => return Err(RemoteError::Silent("it did not answer with its jobs")),
+            }
+        }
     }
 
-    pub(super) const fn first_pass(&self) -> u32 {
-        self.first_pass
+    /// The pass with which the runs of the loaded job begin.
+    pub(super) const fn set_start(&mut self, start: RunStart) {
+        self.start = start;
+    }
+
+    pub(super) const fn start(&self) -> RunStart {
+        self.start
     }
 
     /// The job whose words are sent while it runs, or none.
@@ -679,7 +699,8 @@ fn answered(reply: &Reply) -> Option<u16> {
         | Reply::Profile { number, .. }
         | Reply::Motion { number, .. }
         | Reply::Offsets { number, .. }
-        | Reply::Journal { number, .. } => Some(*number),
+        | Reply::Journal { number, .. }
+        | Reply::StoredJob { number, .. } => Some(*number),
         Reply::Samples { .. } | Reply::PassDigest { .. } | Reply::Room { .. } | Reply::Halted(_) => None,
     }
 }

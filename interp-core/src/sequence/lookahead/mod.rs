@@ -7,6 +7,7 @@ mod pass_plan;
 mod stations;
 mod stretch;
 mod turn_search;
+mod within;
 
 use crate::fault::{Fault, FaultKind, Result};
 use crate::feed::stations::{Derivatives, STATIONS_MAX, Station, Window};
@@ -24,6 +25,7 @@ use crate::sample::{SpanParameter, interval_of};
 use crate::surface::PathSpeed;
 use pass_plan::PIECE_WORDS;
 pub(crate) use pass_plan::PassPlan;
+use within::WholePass;
 
 /// Length of a cell between kept stations that is short enough, mm.
 const CELL_KEPT_MM: f32 = 0.3;
@@ -141,6 +143,8 @@ pub(crate) struct Lookahead {
     length: f32,
     /// Passes for which no turn is tried, because the last one slowed its pass down.
     without: u8,
+    /// The rest of a pass is looked at, for its plan alone: what all of it has given.
+    whole: Option<WholePass>,
 }
 
 impl Lookahead {
@@ -184,6 +188,7 @@ impl Lookahead {
         ends: [TurnEnd::NONE; 2],
         length: 0.0,
         without: 0,
+        whole: None,
     };
 
     /// Resets to the state before the first pass.
@@ -191,6 +196,7 @@ impl Lookahead {
         self.line = None;
         (self.patch_mm, self.pass_mm) = (0.0, 0.0);
         self.without = 0;
+        self.whole = None;
         self.task = Task::Done;
     }
 
@@ -267,10 +273,11 @@ impl Lookahead {
         &mut self,
         job: &Job<'_>,
         axes: &AxisLimits,
-        mut estimator: Option<&mut StepOverEstimator>,
+        estimator: Option<&mut StepOverEstimator>,
         lines: &mut RegionLines,
         out: &mut PassPlan,
     ) -> Result<()> {
+        let mut estimator = estimator.filter(|_| self.whole.is_none());
         self.task = match self.task {
             Task::Patch => {
                 let first = self.patches == 0;
@@ -327,6 +334,11 @@ impl Lookahead {
                 Task::Estimate(looks - 1)
             }
             Task::Close => {
+                if let Some(whole) = self.whole {
+                    self.close_within(&whole, out);
+                    self.task = self.choose_link(job, axes, out);
+                    return Ok(());
+                }
                 if !self.goes_on && looks_again(job, estimator.as_deref_mut()) {
                     let (pass, route, head) = (out.pass, out.route, self.turn);
                     self.line = None;

@@ -42,7 +42,8 @@ impl Lookahead {
         let length = self.patch_length();
         if out.cells == 0 {
             let [start, end] = out.route.ends;
-            let spans = if job.header.edges > 0 {
+            let is_part = job.header.edges > 0 || self.whole.is_some();
+            let spans = if is_part {
                 start.span.abs_diff(end.span).saturating_add(1)
             } else {
                 spans
@@ -52,7 +53,7 @@ impl Lookahead {
                 .unwrap_or(1)
                 .saturating_sub(1)
                 .max(1);
-            let mean = if job.header.edges > 0 || job.header.spacing.is_constant() {
+            let mean = if is_part || job.header.spacing.is_constant() {
                 // The last pass may have been one of a small part of the patch, or short stretches of a front.
                 if spans > 1 {
                     self.patch_mm.at_least(length)

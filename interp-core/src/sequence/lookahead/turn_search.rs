@@ -44,6 +44,10 @@ impl Lookahead {
             return Task::Done;
         }
         self.range = self.piece.range;
+        // The last piece of the pass may have been longer, or shorter.
+        let [start, end] = self.range;
+        let part = end.saturating_sub(start).checked_div(u64::from(self.cells));
+        self.cell_fraction = part.unwrap_or(u64::MAX);
         self.window = Window::EMPTY;
         (self.station, self.arc_mm) = (0, 0.0);
         Task::Start

@@ -19,12 +19,15 @@ use crate::job::program::Job;
 use crate::math::number::Bounded;
 use crate::pass::route::Route;
 use crate::pass::run::Run;
-use crate::sample::{Sample, SpanParameter};
+use crate::sample::{RunStart, Sample, SpanParameter};
 use crate::sequence::hop::Hop;
 use crate::sequence::legs::{Goal, Leg, LegPlanning};
 use crate::sequence::link::{BoundaryStepOver, StraightMove, check_faces_up};
 use crate::sequence::lookahead::{Lookahead, PassPlan};
 use crate::sequence::pause::Return;
+
+/// Least distance of a place within a pass from its ends, 0.5 mm, units of 2^-10 nm: the rest of the pass has cells of its own.
+const WITHIN_Q10: i64 = 500_000 << 10;
 
 /// Phase of the sequence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -142,9 +145,9 @@ pub(crate) struct Sequencer {
     has_rows: bool,
     /// Where a pause leads back to.
     pub(super) back: Return,
-    /// The first pass of the next run, and of this one: those before it are skipped.
-    wanted_pass: u32,
-    first_pass: u32,
+    /// Where the next run begins, and this one: the passes before are skipped. A place within the pass counts until the pass is looked at from there.
+    wanted: RunStart,
+    first: RunStart,
 }
 
 /// The plans of the current or last pass, and of the next.
@@ -190,23 +193,38 @@ impl Sequencer {
         correction: None,
         has_rows: false,
         back: Return::NONE,
-        wanted_pass: 0,
-        first_pass: 0,
+        wanted: RunStart::FIRST,
+        first: RunStart::FIRST,
     };
 
-    /// Sets the pass with which the next run begins.
-    pub(crate) const fn begin_at(&mut self, pass: u32) {
-        self.wanted_pass = pass;
+    /// Sets where the next run begins.
+    pub(crate) const fn begin_at(&mut self, start: RunStart) {
+        self.wanted = start;
+    }
+
+    /// Whether the tool is on a pass, away from its ends.
+    pub(crate) fn is_within(&self) -> bool {
+        let (now, _) = self.plans_ref();
+        let arc_q10 = self.follower.arc_q10();
+        let end_q10 = if now.turns() {
+            now.tail_q10
+        } else {
+            now.plan.length_q10()
+        };
+        self.phase == Phase::Pass
+            && !now.point
+            && arc_q10 - now.head_q10 >= WITHIN_Q10
+            && end_q10 - arc_q10 >= WITHIN_Q10
     }
 
     /// The pass with which this run begins.
     pub(crate) const fn first_pass(&self) -> u32 {
-        self.first_pass
+        self.first.pass
     }
 
     /// Starts the job from the tool's position.
     pub(crate) fn restart(&mut self, first: Route, axes: &AxisLimits) {
-        self.first_pass = core::mem::take(&mut self.wanted_pass);
+        self.first = core::mem::take(&mut self.wanted);
         self.at.get_or_insert(axes.home_nm);
         self.back = Return::NONE;
         self.phase = Phase::Await;

@@ -32,6 +32,10 @@ impl Sequencer {
         let (now, _) = both(&mut self.plans, self.second);
         run.enter_pass(job, now.pass, now.route)?;
         run.begin(now.interval, last)?;
+        let [at_boundary, _] = now.route.reach_boundaries(job);
+        if !at_boundary {
+            run.forget_first();
+        }
         self.on_surface = true;
         self.is_low = false;
         self.phase = Phase::Pass;

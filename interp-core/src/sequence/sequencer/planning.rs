@@ -14,6 +14,7 @@ use crate::math::number::{Bounded, to_f32};
 use crate::pass::front::NextRoute;
 use crate::pass::run::Run;
 use crate::pass::scan::cycles::{NEXT, PATCH};
+use crate::sample::SpanParameter;
 use crate::sequence::link::BoundaryEnd;
 use crate::sequence::lookahead::{PassPlan, has_turns};
 use crate::sequence::turning::road;
@@ -319,7 +320,7 @@ impl Sequencer {
                 if let (Some(estimator), _) = run.estimator_and_lines() {
                     estimator.enter_row(next.route.side.span);
                 }
-                if pass == self.first_pass {
+                if pass == self.first.pass {
                     // It begins at rest, wherever the pass before it would have led.
                     now.tail = Turn::NONE;
                 }
@@ -332,8 +333,14 @@ impl Sequencer {
                 self.pending = self.lookahead.work(job, axes, estimator, lines, next).err();
                 if self.lookahead.is_done() {
                     next.is_last |= next.next.is_none() && !job.header.spacing.is_constant();
-                    if next.pass < self.first_pass {
+                    if next.pass < self.first.pass {
                         return self.skip(run);
+                    }
+                    if let Some(path) = self.first.within() {
+                        // What follows the pass is known from all of it; it is driven from here on.
+                        self.first.path = SpanParameter::NONE;
+                        self.pending = self.lookahead.begin_within(path, next).err();
+                        return;
                     }
                     self.planning = if next.point {
                         Planning::Complete
@@ -371,7 +378,7 @@ impl Sequencer {
                 } else {
                     0
                 };
-                let is_reached_on_surface = next.pass > self.first_pass
+                let is_reached_on_surface = next.pass > self.first.pass
                     && !job.header.spacing.is_constant()
                     && (now.steps_over || job.link_to(next.pass, axes) == Link::Straight);
                 let left = is_reached_on_surface.then(|| {

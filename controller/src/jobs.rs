@@ -1,0 +1,429 @@
+//! Jobs kept in flash: several, by name, each whole or not there.
+//!
+//! Two sectors, each filled from its begin on. An entry is a head of [`HEAD`] bytes (a mark, sequence number, words and name, which are enough to find it; what [`StoredJob`] has; a CRC-32), the job's words, and two words: one
+//! that is written last, and one that is written when the job is deleted. An entry whose last word is missing was cut short: it is no job, and its place is lost until the
+//! sector is erased. The words themselves are checked by their digest when the job is loaded, as those of a host are.
+//! **An erase stops the processor for a second**, so it happens at power-up only ([`JobStore::open`]): of a sector in which nothing is kept any more. Of two jobs
+//! of one name the later counts, so a job is replaced as a whole.
+
+use embedded_storage::nor_flash::NorFlash;
+use protocol::{
+    digest::Digest,
+    frame::crc32,
+    message::{JOB_NAME_MAX, STORED_JOB_BYTES_MAX, StoredJob},
+};
+
+use crate::storage::StorageError;
+
+/// Bytes of an entry's head.
+const HEAD: usize = 284;
+/// A word, and the two words behind a job's.
+const WORD: u32 = 4;
+const TAIL: u32 = 2 * WORD;
+const CRC: usize = 4;
+/// Bytes before what the job has: mark, sequence number, words, name.
+const BEGIN: usize = 12 + JOB_NAME_MAX;
+const _: () = assert!(BEGIN + STORED_JOB_BYTES_MAX + CRC == HEAD && HEAD.is_multiple_of(WORD as usize));
+
+/// First word of a head, and the last of a whole job.
+const MARK: u32 = 0x626f_6a31;
+const WHOLE: u32 = 0x6c6c_6121;
+const BLANK: u32 = u32::MAX;
+
+/// Words written or read at once.
+const CHUNK: usize = 16;
+
+/// Where a job is kept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct JobPlace {
+    /// Offset of its entry, and its words.
+    offset: u32,
+    words: u32,
+    sequence: u32,
+}
+
+impl JobPlace {
+    const fn data(&self) -> u32 {
+        self.offset + HEAD as u32
+    }
+
+    const fn tail(&self) -> u32 {
+        self.data() + self.words * WORD
+    }
+
+    const fn end(&self) -> u32 {
+        self.tail() + TAIL
+    }
+}
+
+/// A job's name, filled up with zeros.
+type Name = [u8; JOB_NAME_MAX];
+
+fn padded(name: &str) -> Name {
+    let mut padded = [0; JOB_NAME_MAX];
+    for (to, from) in padded.iter_mut().zip(name.bytes()) {
+        *to = from;
+    }
+    padded
+}
+
+/// What is at a place of a sector.
+enum Entry {
+    /// Nothing: the end of what is written.
+    Blank,
+    /// A head that was not written to its end.
+    Broken,
+    /// A job, and whether it is kept.
+    Job(JobPlace, Name, bool),
+}
+
+/// Jobs in two sectors of a flash of `2 * F::ERASE_SIZE` bytes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JobStore<F> {
+    flash: F,
+    /// The end of what is written in each sector.
+    ends: [u32; 2],
+    sequence: u32,
+    writing: Option<Writing>,
+}
+
+/// The job that is being written.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Writing {
+    place: JobPlace,
+    name: Name,
+    digest: u64,
+    /// Its words so far.
+    done: u32,
+}
+
+impl<F: NorFlash + Default> Default for JobStore<F> {
+    fn default() -> Self {
+        Self::open(F::default())
+    }
+}
+
+impl<F: NorFlash> JobStore<F> {
+    const SECTOR: u32 = F::ERASE_SIZE as u32;
+
+    /// Finds the jobs; erases a sector that keeps none and is not blank, which takes up to some seconds.
+    pub fn open(flash: F) -> Self {
+        let mut store = Self {
+            flash,
+            // No room.
+            ends: [Self::SECTOR, 2 * Self::SECTOR],
+            sequence: 0,
+            writing: None,
+        };
+        for sector in [0, 1] {
+            let mut keeps = false;
+            let Walked { end, newest, .. } = store.walk(sector, |_, _, is_kept| {
+                keeps |= is_kept;
+                false
+            });
+            store.sequence = store.sequence.max(newest);
+            let begin = sector * Self::SECTOR;
+            let is_ready = keeps
+                || (end == begin && store.is_blank(begin))
+                || store.flash.erase(begin, begin + Self::SECTOR).is_ok();
+            if let Some(place) = store.ends.get_mut(sector as usize).filter(|_| is_ready) {
+                *place = if keeps { end } else { begin };
+            }
+        }
+        store
+    }
+
+    /// Whether the sector that begins here is blank to its end: an erase that was cut short may have reached its begin only. Every eighth word is read, because all take
+    /// 13 ms; what is left of jobs is longer, and a job that does not read back is not kept.
+    fn is_blank(&mut self, begin: u32) -> bool {
+        let words = (begin..begin + Self::SECTOR).step_by(8 * WORD as usize);
+        for at in words {
+            if self.word(at) != BLANK {
+                return false;
+            }
+        }
+        true
+    }
+
+    /// The flash.
+    pub fn into_flash(self) -> F {
+        self.flash
+    }
+
+    /// The entry at an offset, in a sector with this end.
+    fn entry(&mut self, offset: u32, limit: u32) -> Entry {
+        let mut head = [0; HEAD];
+        if self.flash.read(offset, &mut head).is_err() {
+            return Entry::Broken;
+        }
+        if head.iter().take(2 * WORD as usize).all(|byte| *byte == 0xff) {
+            return Entry::Blank;
+        }
+        let Some((place, name)) = read_head(&head, offset) else {
+            return Entry::Broken;
+        };
+        let Some(bytes) = place
+            .words
+            .checked_mul(WORD)
+            .filter(|bytes| *bytes <= Self::SECTOR)
+        else {
+            return Entry::Broken;
+        };
+        let end = offset.saturating_add(HEAD as u32 + bytes + TAIL);
+        if end > limit {
+            return Entry::Broken;
+        }
+        let is_kept = self.word(place.tail()) == WHOLE && self.word(place.tail() + WORD) == BLANK;
+        Entry::Job(place, name, is_kept)
+    }
+
+    /// Goes through the entries of a sector, until it is the one.
+    fn walk(&mut self, sector: u32, mut is_it: impl FnMut(&JobPlace, &Name, bool) -> bool) -> Walked {
+        let mut walked = Walked {
+            end: sector * Self::SECTOR,
+            newest: 0,
+            taken: None,
+        };
+        let limit = (sector + 1) * Self::SECTOR;
+        while walked.end + HEAD as u32 + TAIL <= limit {
+            match self.entry(walked.end, limit) {
+                Entry::Blank => break,
+                Entry::Broken => walked.end += HEAD as u32,
+                Entry::Job(place, name, is_kept) => {
+                    walked.end = place.end();
+                    walked.newest = walked.newest.max(place.sequence);
+                    if is_it(&place, &name, is_kept) {
+                        walked.taken = Some(place);
+                        break;
+                    }
+                }
+            }
+        }
+        walked
+    }
+
+    /// The kept job with this number, in order of their places.
+    pub fn nth(&mut self, number: u32) -> Option<JobPlace> {
+        let mut left = number;
+        self.first(|_, _| {
+            let is_it = left == 0;
+            left = left.saturating_sub(1);
+            is_it
+        })
+    }
+
+    /// The first kept job that it is.
+    #[inline(never)]
+    fn first(&mut self, mut is_it: impl FnMut(&JobPlace, &Name) -> bool) -> Option<JobPlace> {
+        let mut sectors = [0, 1].into_iter();
+        sectors.find_map(|sector| {
+            let walked = self.walk(sector, |place, name, is_kept| is_kept && is_it(place, name));
+            walked.taken
+        })
+    }
+
+    /// The kept job of this name that was stored last; the one stored last of all without a name.
+    pub fn find(&mut self, name: Option<&str>) -> Option<JobPlace> {
+        let wanted = name.map(padded);
+        let mut newest: Option<JobPlace> = None;
+        self.first(|place, name| {
+            let is_it = wanted.is_none_or(|wanted| wanted == *name);
+            if is_it && newest.is_none_or(|before| place.sequence > before.sequence) {
+                newest = Some(*place);
+            }
+            false
+        });
+        newest
+    }
+
+    /// What a job has apart from its words.
+    #[inline(never)]
+    pub fn job(&mut self, place: &JobPlace) -> Option<StoredJob> {
+        let mut bytes = [0; STORED_JOB_BYTES_MAX];
+        self.flash.read(place.offset + BEGIN as u32, &mut bytes).ok()?;
+        StoredJob::read(&bytes)
+    }
+
+    /// Words of the longest job for which there is room now.
+    pub fn room(&self) -> u32 {
+        let rooms = self.ends.iter().zip([1, 2]).map(|(end, sectors)| {
+            let left = (sectors * Self::SECTOR).saturating_sub(*end);
+            left.saturating_sub(HEAD as u32 + TAIL) / WORD
+        });
+        rooms.max().unwrap_or(0)
+    }
+
+    /// Begins to store a job.
+    ///
+    /// # Errors
+    /// There is no room, or the flash cannot be written.
+    #[inline(never)]
+    pub fn begin(&mut self, job: &StoredJob) -> Result<(), StorageError> {
+        let bytes = job.words.checked_mul(WORD).ok_or(StorageError)?;
+        let needed = bytes.checked_add(HEAD as u32 + TAIL).ok_or(StorageError)?;
+        let sequence = self.sequence.checked_add(1).ok_or(StorageError)?;
+        let mut head = [0xff; HEAD];
+        let mut payload = [0; STORED_JOB_BYTES_MAX];
+        let payload = job.write(&mut payload).ok_or(StorageError)?;
+        let (data, crc) = head.split_at_mut(HEAD - CRC);
+        let numbers = [MARK, sequence, job.words].map(u32::to_le_bytes);
+        let fields = numbers.into_iter().flatten().chain(padded(&job.name));
+        for (to, from) in data.iter_mut().zip(fields.chain(payload.iter().copied())) {
+            *to = from;
+        }
+        crc.copy_from_slice(&crc32(data).to_le_bytes());
+        let free = self.ends.iter_mut().zip([1, 2]).find(|(end, sectors)| {
+            **end <= sectors * Self::SECTOR && sectors * Self::SECTOR - **end >= needed
+        });
+        let (end, _) = free.ok_or(StorageError)?;
+        let place = JobPlace {
+            offset: *end,
+            words: job.words,
+            sequence,
+        };
+        // Whatever happens, this place is not blank any more.
+        *end += HEAD as u32;
+        self.flash.write(place.offset, &head).map_err(|_| StorageError)?;
+        *end = place.end();
+        self.sequence = sequence;
+        self.writing = Some(Writing {
+            place,
+            name: padded(&job.name),
+            digest: job.digest,
+            done: 0,
+        });
+        Ok(())
+    }
+
+    /// Writes the next words of the job.
+    ///
+    /// # Errors
+    /// The flash cannot be written, or there are more words than the job has.
+    pub fn write(&mut self, words: &[i32]) -> Result<(), StorageError> {
+        let writing = self.writing.as_mut().ok_or(StorageError)?;
+        let Writing { place, done, .. } = *writing;
+        let count = u32::try_from(words.len()).map_err(|_| StorageError)?;
+        if count > place.words - done || words.len() > CHUNK {
+            return Err(StorageError);
+        }
+        let mut bytes = [0; CHUNK * WORD as usize];
+        for (to, from) in bytes.chunks_exact_mut(WORD as usize).zip(words) {
+            to.copy_from_slice(&from.to_le_bytes());
+        }
+        let bytes = bytes.get(..words.len() * WORD as usize).ok_or(StorageError)?;
+        let at = place.data() + done * WORD;
+        self.flash.write(at, bytes).map_err(|_| StorageError)?;
+        writing.done += count;
+        Ok(())
+    }
+
+    /// Ends a job: it is kept from here on, and one of the same name is not any more.
+    ///
+    /// # Errors
+    /// Words are missing or read back differently, or the flash cannot be written: the job is not kept.
+    pub fn finish(&mut self) -> Result<(), StorageError> {
+        let Writing {
+            place,
+            name,
+            digest,
+            done,
+        } = self.writing.take().ok_or(StorageError)?;
+        if done != place.words || self.digest(&place) != digest {
+            return Err(StorageError);
+        }
+        self.set_word(place.tail(), WHOLE)?;
+        let is_before = |other: &JobPlace, its: &Name| *other != place && *its == name;
+        while let Some(before) = self.first(is_before) {
+            self.delete_at(&before)?;
+        }
+        Ok(())
+    }
+
+    /// Keeps a job no longer. Returns whether there was one.
+    ///
+    /// # Errors
+    /// The flash cannot be written.
+    pub fn delete(&mut self, name: &str) -> Result<bool, StorageError> {
+        let mut found = false;
+        while let Some(place) = self.find(Some(name)) {
+            self.delete_at(&place)?;
+            found = true;
+        }
+        Ok(found)
+    }
+
+    fn delete_at(&mut self, place: &JobPlace) -> Result<(), StorageError> {
+        self.set_word(place.tail() + WORD, 0)
+    }
+
+    /// Words of a job from an offset on; fewer than asked for at its end.
+    pub fn read<'a>(&mut self, place: &JobPlace, offset: u32, words: &'a mut [i32; CHUNK]) -> &'a [i32] {
+        let count = place.words.saturating_sub(offset).min(CHUNK as u32);
+        let mut at = place.data() + offset * WORD;
+        let words = words.get_mut(..count as usize).unwrap_or(&mut []);
+        for word in &mut *words {
+            *word = self.word(at).cast_signed();
+            at += WORD;
+        }
+        words
+    }
+
+    /// The digest of a job's words.
+    fn digest(&mut self, place: &JobPlace) -> u64 {
+        let mut digest = Digest::new();
+        let mut offset = 0;
+        while offset < place.words {
+            let mut chunk = [0; CHUNK];
+            digest.words(self.read(place, offset, &mut chunk));
+            offset += CHUNK as u32;
+        }
+        digest.value()
+    }
+
+    fn word(&mut self, at: u32) -> u32 {
+        let mut bytes = [0; WORD as usize];
+        // What cannot be read is no job.
+        self.flash
+            .read(at, &mut bytes)
+            .map_or(0, |()| u32::from_le_bytes(bytes))
+    }
+
+    fn set_word(&mut self, at: u32, word: u32) -> Result<(), StorageError> {
+        self.flash
+            .write(at, &word.to_le_bytes())
+            .map_err(|_| StorageError)?;
+        if self.word(at) == word {
+            Ok(())
+        } else {
+            Err(StorageError)
+        }
+    }
+}
+
+/// The way through a sector.
+struct Walked {
+    end: u32,
+    newest: u32,
+    taken: Option<JobPlace>,
+}
+
+/// Place and name of a job with a head that is whole.
+fn read_head(head: &[u8; HEAD], offset: u32) -> Option<(JobPlace, Name)> {
+    let (data, crc) = head.split_at(HEAD - CRC);
+    let (mark, rest) = data.split_first_chunk()?;
+    let (sequence, rest) = rest.split_first_chunk()?;
+    let (words, rest) = rest.split_first_chunk()?;
+    let (name, _) = rest.split_first_chunk()?;
+    if u32::from_le_bytes(*mark) != MARK || crc32(data).to_le_bytes() != *crc {
+        return None;
+    }
+    let place = JobPlace {
+        offset,
+        words: u32::from_le_bytes(*words),
+        sequence: u32::from_le_bytes(*sequence),
+    };
+    Some((place, *name))
+}
+
+#[cfg(test)]
+mod tests;
