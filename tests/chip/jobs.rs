@@ -8,7 +8,7 @@ use interp_core::State;
 use machine::prepare::{Prepared, prepare};
 use machine::remote::{RemoteError, Session, drive};
 use protocol::digest::job_digest;
-use protocol::message::{JobName, Journal, Reason, Request, job_mark};
+use protocol::message::{JobName, Reason, Request, job_mark};
 
 use super::emulated::Emulated;
 use super::settings::session;
@@ -17,6 +17,8 @@ use super::settings::session;
 const BETWEEN_CUTS: &str = "379";
 /// The supply fails in every third erase, too.
 const BETWEEN_ERASES: &str = "3";
+/// Most runs of a job that is stored; their number changes, so that failures come at all operations.
+const RUNS: u32 = 13;
 /// Failures of the supply.
 const CUTS: u32 = 30;
 
@@ -38,13 +40,17 @@ fn mark(job: &Prepared) -> u64 {
 #[derive(Clone, Debug, Default, PartialEq)]
 struct Kept {
     jobs: BTreeMap<String, u64>,
-    journal: Option<Journal>,
+    /// Job and profile of the last run, which is not finished: how far it came is up to the time.
+    journal: Option<(u64, u32)>,
 }
 
 impl Kept {
     fn of(link: &mut Session) -> Self {
         let (jobs, _) = link.stored_jobs().unwrap();
-        let journal = link.journal().unwrap();
+        let journal = link.journal().unwrap().map(|journal| {
+            assert!(!journal.is_finished, "{journal:?}");
+            (journal.job, journal.profile)
+        });
         let count = jobs.len();
         let jobs: BTreeMap<_, _> = jobs
             .into_iter()
@@ -185,22 +191,18 @@ fn a_supply_that_fails_while_jobs_are_stored_leaves_whole_ones() {
                 continue;
             }
             let profile = link.status().unwrap().profile;
-            link = bench.operate(
-                link,
-                &Operation {
-                    what: "journal",
-                    does: &|link| run(link, &job, name),
-                    changes: &|kept| {
-                        kept.journal = Some(Journal {
-                            job: mark(&job),
-                            profile,
-                            pass: 0,
-                            is_finished: false,
-                            path: interp_core::SpanParameter::NONE,
-                        });
+            for _ in 0..number * 5 % RUNS {
+                link = bench.operate(
+                    link,
+                    &Operation {
+                        what: "journal",
+                        does: &|link| run(link, &job, name),
+                        changes: &|kept| {
+                            kept.journal = Some((mark(&job), profile));
+                        },
                     },
-                },
-            );
+                );
+            }
         }
         if round % 3 == 2 {
             for name in ["left", "right"] {
@@ -230,5 +232,11 @@ fn a_supply_that_fails_while_jobs_are_stored_leaves_whole_ones() {
     drop(link);
     let ended = bench.emulated.end();
     ended.no_complaint();
-    println!("{:?}, {} erases", bench.cuts, ended.report["flash_erased"]);
+    assert!(bench.cuts.len() > 1, "{:?}", bench.cuts);
+    println!(
+        "{} words; {:?}, {} erases",
+        job(0).words.len(),
+        bench.cuts,
+        ended.report["flash_erased"]
+    );
 }
