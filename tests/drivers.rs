@@ -146,6 +146,8 @@ fn every_input_is_found_on_its_pin() {
             Role::LimitMax(Axis::Z) => Some("limit switch z+"),
             Role::DriveFault => Some("drive fault"),
             Role::Probe => Some("probe"),
+            Role::Door => Some("safety door"),
+            Role::AtSpeed => Some("spindle at speed"),
             Role::Start => Some("start button"),
             _ => None,
         };
@@ -174,7 +176,7 @@ fn every_input_is_found_on_its_pin() {
                 found += names.len();
             }
         }
-        assert_eq!(found, 2 * 10, "{}", board.id);
+        assert_eq!(found, 2 * 12, "{}", board.id);
     }
 }
 

@@ -1,6 +1,6 @@
 //! Jobs kept in flash: several, by name, each whole or not there.
 //!
-//! Two sectors, each filled from its begin on. An entry is a head of [`HEAD`] bytes (a mark, sequence number, words and name, which are enough to find it; what [`StoredJob`] has; a CRC-32), the job's words, and two words: one
+//! Two sectors, each filled from its begin on. An entry is a head of `HEAD` bytes (a mark, sequence number, words and name, which are enough to find it; what [`StoredJob`] has; a CRC-32), the job's words, and two words: one
 //! that is written last, and one that is written when the job is deleted. An entry whose last word is missing was cut short: it is no job, and its place is lost until the
 //! sector is erased. The words themselves are checked by their digest when the job is loaded, as those of a host are.
 //! **An erase stops the processor for a second**, so it happens at power-up only ([`JobStore::open`]): of a sector in which nothing is kept any more. Of two jobs

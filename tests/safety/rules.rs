@@ -79,7 +79,9 @@ struct Rules {
 
 impl Rules {
     fn tick(&mut self, raw: u16) {
-        for bit in 0..12 {
+        // Without a profile there is neither a door nor a contact of the spindle.
+        let raw = raw & !0x3000;
+        for bit in 0..16 {
             let (mask, set) = (1 << bit, raw >> bit & 1 != 0);
             let differs = set != (self.steady & mask != 0);
             self.counts[bit] = if differs { self.counts[bit] + 1 } else { 0 };
@@ -92,7 +94,7 @@ impl Rules {
                 self.counts[bit] = 0;
             }
         }
-        let stops = self.steady & 0x781;
+        let stops = self.steady & 0x8781;
         self.latched |= stops;
         if stops != 0 {
             (self.homed, self.drives) = (false, false);
@@ -142,7 +144,7 @@ impl Bench {
         if after.state.is_under_way() && !before.state.is_under_way() {
             prop_assert!(self.rules.may_start(before.safety.configuration.homing_required));
         }
-        let cut = self.rules.steady & 0x781 != 0;
+        let cut = self.rules.steady & 0x8781 != 0;
         if cut && before.state.is_under_way() {
             prop_assert_eq!((after.state, after.samples), (State::Faulted, before.samples));
             let kind = after.fault.and_then(FaultReport::kind);
@@ -192,7 +194,7 @@ impl Bench {
 
     fn order(&mut self, order: Order) -> Result<(), TestCaseError> {
         let status = self.half.status();
-        let (under_way, stops) = (status.state.is_under_way(), self.rules.steady & 0x781);
+        let (under_way, stops) = (status.state.is_under_way(), self.rules.steady & 0x8781);
         let rules = &mut self.rules;
         let allowed = match order {
             Order::Acknowledge => stops == 0,

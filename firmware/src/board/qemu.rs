@@ -51,8 +51,9 @@ const EXIT_PANIC: i32 = 101;
 /// Exit code of QEMU after a fault of the processor.
 const EXIT_FAULT: i32 = 102;
 
-/// Returns the peripherals.
+/// Returns the peripherals, with no input asserted.
 pub(crate) fn init(device: pac::Peripherals) -> Board {
+    simulate(InputLines::NONE);
     Board {
         tim1: device.TIM1,
         tim2: device.TIM2,
@@ -79,7 +80,7 @@ pub(crate) const fn supply_is_low() -> bool {
     false
 }
 
-/// Simulated input registers of the ports: the inputs set by the host, initially none.
+/// Simulated input registers of the ports: the inputs set by the host.
 static INPUTS: [AtomicU32; Port::ALL.len()] = [const { AtomicU32::new(0) }; Port::ALL.len()];
 
 /// The ports whose inputs are [`INPUTS`].

@@ -8,9 +8,9 @@ use toml::de::{DeTable, DeValue};
 
 use job::{JobError, Origin};
 
-/// Largest edit distance (insert, delete, replace) between an unknown key and a suggested one, as a share of the length: beyond a half
+/// Largest edit distance (insert, delete, replace) between an unknown key and a suggested one, as a share of the length: beyond a third
 /// a suggestion misleads.
-const SUGGESTION_SHARE: usize = 2;
+const SUGGESTION_SHARE: usize = 3;
 
 /// The text of a job file.
 #[derive(Clone, Copy)]

@@ -65,23 +65,25 @@ impl RationalRecord {
     /// # Errors
     /// [`crate::fault::FaultKind::BadPatch`].
     pub fn check(words: &[i32; RATIONAL_WORDS]) -> Result<()> {
-        let ([.., head], _) = split(words);
-        let record = Self::from_words(words);
-        let [x, y, z, weight] = &record.coefficients;
-        let edges = record.edges;
+        let ([.., head], blocks) = split(words);
+        let HeadWord { edges, .. } = HeadWord::from_word(head);
         let vanishes =
             |c: &[[i32; 4]; 4]| edges.count() == 0 || (collapses(c, edges) && touches_zero(c, edges));
+        // Half the range of i32, because the quotient by a weight of at least 1/2 has to fit too.
+        let is_numerator = |c: &[[i32; 4]; 4]| patch_bound(c) < 1 << 30 && vanishes(c);
+        let is_weight = |c: &[[i32; 4]; 4]| fits(c) && weight_in_range(c);
+        let mut axes = blocks
+            .iter()
+            .zip(0..)
+            .map(|(block, axis)| (block.as_chunks().0.first_chunk(), axis));
         let good = HeadWord::check(head)
-            && fits(weight)
-            // Half the range of i32, because the quotient by a weight of at least 1/2 has to fit too.
-            && [x, y, z].into_iter().all(|c| patch_bound(c) < 1 << 30)
-            && [x, y, z].into_iter().all(vanishes)
-            && weight_in_range(weight);
+            && axes.all(|(c, axis)| c.is_some_and(|c| if axis < 3 { is_numerator(c) } else { is_weight(c) }));
         if good { Ok(()) } else { BAD_PATCH }
     }
 }
 
 /// Whether a coordinate is zero (within 8 units) in the middle of its collapsed boundary.
+#[inline(never)]
 fn touches_zero(c: &[[i32; 4]; 4], edges: Edges) -> bool {
     let end = |root: Root| if root == Root::Start { i32::MIN } else { i32::MAX };
     let (w, y) = (
@@ -91,27 +93,26 @@ fn touches_zero(c: &[[i32; 4]; 4], edges: Edges) -> bool {
     cubic(&c.map(|row| cubic(&row, y)), w).abs() <= 8
 }
 
-/// Whether a weight stays in range on its patch: its Bernstein coefficients do, and they enclose it.
+/// Whether a weight stays in range on its patch: its Bernstein coefficients do, and they enclose it. Apart from the caller, so that their frames do not add up.
+#[inline(never)]
 fn weight_in_range(c: &[[i32; 4]; 4]) -> bool {
-    // Rows to Bernstein coefficients times 24, then columns likewise: 576 in all, well within i64.
-    let bernstein = |c: [i64; 4]| {
-        let [c0, c1, c2, c3] = c;
-        // p(w), w = t - 1/2, as 24 p = sum of (24, 12, 6, 3) c_i (2w)^i; 2w = -1 .. 1 has the coefficients below.
-        let (d0, d1, d2, d3) = (24 * c0, 12 * c1, 6 * c2, 3 * c3);
+    // p(w), w = t - 1/2, as 24 p = sum of (24, 12, 6, 3) c_i (2w)^i; 2w = -1 .. 1 has these coefficients.
+    let bernstein = |[c0, c1, c2, c3]: [i64; 4]| {
+        let (c0, d1, d2, c3) = (24 * c0, 4 * c1, 2 * c2, 3 * c3);
         [
-            d0 - d1 + d2 - d3,
-            d0 - d1 / 3 - d2 / 3 + d3,
-            d0 + d1 / 3 - d2 / 3 - d3,
-            d0 + d1 + d2 + d3,
+            c0 - 3 * d1 + 3 * d2 - c3,
+            c0 - d1 - d2 + c3,
+            c0 + d1 - d2 - c3,
+            c0 + 3 * d1 + 3 * d2 + c3,
         ]
     };
-    let [r0, r1, r2, r3] = c.map(|row| bernstein(row.map(i64::from)));
-    let columns = [0, 1, 2, 3_usize].map(|j| {
-        let pick = |row: [i64; 4]| row.get(j).copied().unwrap_or(0);
-        bernstein([pick(r0), pick(r1), pick(r2), pick(r3)])
-    });
+    // Rows to Bernstein coefficients times 24, then columns likewise: 576 in all, well within i64.
+    let rows = c.map(|row| bernstein(row.map(i64::from)));
     let range = i64::from(WEIGHT_MIN) * 576..=i64::from(WEIGHT_MAX) * 576;
-    columns.into_iter().flatten().all(|value| range.contains(&value))
+    (0..4).all(|j| {
+        let column = rows.map(|row| row.get(j).copied().unwrap_or(0));
+        bernstein(column).into_iter().all(|value| range.contains(&value))
+    })
 }
 
 /// The weight and its derivatives at a point of a pass.
