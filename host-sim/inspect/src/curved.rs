@@ -1,11 +1,13 @@
-//! Passes of constant scallop height beside straight ones: number, length and time.
+//! Passes of constant scallop height beside straight ones: number, length, time and crests.
 
 use std::collections::BTreeMap;
 
 use glam::DVec3;
 use job::{Job, Spacing};
 use machine::prepare::{Prepared, prepare};
-use oracle::Oracle;
+use oracle::{Oracle, PassSample};
+use verify::EmittedSample;
+use verify::swept::{self, SweptResult, ToolPath};
 
 use crate::run::machine;
 use crate::{InspectError, is_on_pass, plain};
@@ -53,7 +55,49 @@ impl CurvedFigures {
 /// # Errors
 /// The core refuses the job, or a fault ends it.
 pub fn path_figures(job: &Job, prepared: &Prepared) -> Result<PathFigures, InspectError> {
+    follow(job, prepared, &Oracle::new(job)?, &mut |_| ())
+}
+
+/// The same, and the crests that the passes leave, from samples at least this far apart.
+///
+/// # Errors
+/// As [`path_figures`].
+pub fn path_and_crests(
+    job: &Job,
+    prepared: &Prepared,
+    spacing_mm: f64,
+) -> Result<(PathFigures, SweptResult), InspectError> {
     let oracle = Oracle::new(job)?;
+    let mut track = ToolPath::with_spacing(spacing_mm * 1e6);
+    // Held back until the next sample shows whether it is the last of its pass.
+    let mut held: Option<PassSample> = None;
+    let path = follow(job, prepared, &oracle, &mut |sample| {
+        let first = held.is_none_or(|before| before.pass != sample.pass);
+        if let Some(before) = &mut held {
+            if !first && sample.parameters == Some([before.u, before.v]) {
+                return;
+            }
+            before.last_of_pass = first;
+            track.add(before, job.along);
+        }
+        held = sample.emitted(first, false);
+    })?;
+    if let Some(mut last) = held {
+        last.last_of_pass = true;
+        track.add(&last, job.along);
+    }
+    let requirements = swept::Requirements::default();
+    let swept = swept::measure(job, &oracle, &track, true, &requirements, &());
+    Ok((path, swept))
+}
+
+/// Runs a job on the core, measures its path, and passes on every sample on a pass.
+fn follow(
+    job: &Job,
+    prepared: &Prepared,
+    oracle: &Oracle,
+    each: &mut dyn FnMut(&EmittedSample),
+) -> Result<PathFigures, InspectError> {
     let mut passes = BTreeMap::<u32, [f64; 2]>::new();
     let (mut length_mm, mut ticks) = (0.0, 0_u32);
     let mut last: Option<(u32, DVec3)> = None;
@@ -65,6 +109,7 @@ pub fn path_figures(job: &Job, prepared: &Prepared) -> Result<PathFigures, Inspe
             last = None;
             return true;
         };
+        each(&emitted);
         let (path, _) = oracle.swapped(u, v);
         let ends = passes.entry(sample.pass).or_insert([path; 2]);
         *ends = [ends[0], path];

@@ -14,7 +14,7 @@ mod run;
 mod sample;
 mod verification;
 
-pub use curved::{CurvedFigures, PathFigures, curved_figures, path_figures};
+pub use curved::{CurvedFigures, PathFigures, curved_figures, path_and_crests, path_figures};
 pub use error::InspectError;
 pub use fault::FaultAt;
 pub use run::{PassDigest, TimedRun, load_error, oracle, survey_run, time_run};

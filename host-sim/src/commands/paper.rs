@@ -7,11 +7,11 @@ use serde_json::{Value, json};
 
 use super::out::say;
 use super::{Result, cannot_write, progress};
-use study::paper::{Comparison, Item, Row, STEPS, study};
+use study::paper::{Comparison, Item, Row, STEPS, SpacingTable, study};
 use study::report as page;
 use verify::speeds::SpeedRange;
 
-/// Reproduces every example, table and figure of Lo's paper (1998), and compares the four approaches.
+/// Reproduces every example, table and figure of Lo's paper (1998), and compares the four approaches, and passes of constant scallop height.
 ///
 /// Example: cargo sim paper --report out
 #[derive(Debug, Args)]
@@ -71,6 +71,34 @@ fn compared(comparisons: &[Comparison]) -> Vec<Item> {
             items.extend(figures.map(|(what, unit, decimals, ours)| Item {
                 part: "Comparison",
                 what: format!("{}: {}: {what}", comparison.name, row.name()),
+                unit,
+                decimals,
+                printed: None,
+                ours: Some(ours),
+                note: String::new(),
+            }));
+        }
+    }
+    items
+}
+
+/// Passes of constant scallop height beside straight ones, as items without a printed figure.
+fn spaced(tables: &[SpacingTable]) -> Vec<Item> {
+    let mut items = Vec::new();
+    for table in tables {
+        for row in &table.rows {
+            let figures = [
+                ("passes", "", 0, row.path.passes as f64),
+                ("partial passes", "", 0, row.path.partial as f64),
+                ("length of all passes", "mm", 1, row.path.length_mm),
+                ("whole time", "min", 3, row.path.time_s / 60.0),
+                ("highest crest over the limit", "", 4, row.crest_max),
+                ("mean crest over the limit", "", 4, row.crest_mean),
+                ("error of the crests over the limit", "", 5, row.error),
+            ];
+            items.extend(figures.map(|(what, unit, decimals, ours)| Item {
+                part: "Spacing",
+                what: format!("{}: {}: {what}", table.name, row.name()),
                 unit,
                 decimals,
                 printed: None,
@@ -151,6 +179,44 @@ fn print_comparison(comparison: &Comparison) {
     }
 }
 
+fn print_spacing(table: &SpacingTable) {
+    say!(
+        "\n{} ({}): feed {} mm/s, scallop {} mm, zigzag with the axis limits of jobs/plate_machine.toml",
+        table.title,
+        table.name,
+        table.feed_mm_s,
+        table.scallop_mm
+    );
+    say!(
+        "  {:<16} {:>7} {:>8} {:>10} {:>6} {:>9} {:>6} {:>8} {:>8} {:>8}",
+        "",
+        "passes",
+        "partial",
+        "length, mm",
+        "ratio",
+        "time, min",
+        "ratio",
+        "crest",
+        "mean",
+        "+-"
+    );
+    for row in &table.rows {
+        say!(
+            "  {:<16} {:>7} {:>8} {:>10.1} {:>6.3} {:>9.2} {:>6.3} {:>8.4} {:>8.4} {:>8.4}",
+            row.name(),
+            row.path.passes,
+            row.path.partial,
+            row.path.length_mm,
+            table.length_ratio(row),
+            row.path.time_s / 60.0,
+            table.time_ratio(row),
+            row.crest_max,
+            row.crest_mean,
+            row.error,
+        );
+    }
+}
+
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
     if let Some(folder) = &arguments.report {
         // Created before the work, so that an invalid path fails at once.
@@ -161,6 +227,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     bar.finish_and_clear();
     let mut items = study.items.clone();
     items.extend(compared(&study.comparisons));
+    items.extend(spaced(&study.spacings));
     let written = arguments
         .report
         .as_ref()
@@ -177,6 +244,10 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     for comparison in &study.comparisons {
         print_comparison(comparison);
     }
+    say!(
+        "\nPasses of constant scallop height beside straight ones; crests by the swept ball, over the limit"
+    );
+    study.spacings.iter().for_each(print_spacing);
     if let Some(page) = written {
         say!("\nreport: {}", page.display());
     }

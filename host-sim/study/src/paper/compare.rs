@@ -1,16 +1,12 @@
 //! The four approaches on whole jobs, at the same scallop height, tolerance and feed.
 
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
-
 use super::{Case, Cases};
 use approach::{ApproachError, Kind, Measured, measure};
+use rayon::prelude::*;
 use report::Sketch;
 
 /// Sampling periods that the linear interpolator is shown with, µs: the paper's, and the product's.
 pub const PERIODS_US: [f64; 2] = [5000.0, 1000.0];
-/// Greatest number of threads: more than four gain little.
-const THREADS: usize = 4;
 
 /// One approach on one job.
 #[derive(Clone, Debug)]
@@ -117,50 +113,19 @@ pub fn comparisons(cases: &Cases, step: &(dyn Fn() + Sync)) -> Result<Vec<Compar
         (&cases.reconstructed, "Example 2, the reconstructed ruled surface"),
         (&cases.freeform, "The freeform shell, which is not in the paper"),
     ];
-    let tasks: Vec<(usize, Kind, f64)> = (0..JOBS)
-        .flat_map(|job| ROWS.map(|(kind, period_us)| (job, kind, period_us)))
-        .collect();
-    let mut passes = [0; JOBS];
-    for (count, (case, _)) in passes.iter_mut().zip(&jobs) {
-        *count = case.oracle.schedule()?.len();
-    }
-    let next = AtomicUsize::new(0);
-    let done = Mutex::new(Vec::new());
-    std::thread::scope(|scope| {
-        for _ in 0..THREADS.min(std::thread::available_parallelism().map_or(1, usize::from)) {
-            scope.spawn(|| {
-                while let Some((job, kind, period_us)) = tasks.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    let case = jobs[*job].0.with_period_us(*period_us);
-                    let row = row(&case, *kind, passes[*job], step);
-                    done.lock()
-                        .unwrap_or_else(std::sync::PoisonError::into_inner)
-                        .push((*job, *kind, *period_us, row));
-                }
-            });
-        }
-    });
-    let mut done = done
-        .into_inner()
-        .unwrap_or_else(std::sync::PoisonError::into_inner);
-    let mut comparisons = Vec::new();
-    for (index, (case, title)) in jobs.into_iter().enumerate() {
-        let mut rows = Vec::new();
-        for (kind, period_us) in ROWS {
-            let place = done
-                .iter()
-                .position(|(job, of, period, _)| (*job, *of, *period) == (index, kind, period_us));
-            if let Some(place) = place {
-                rows.push(done.swap_remove(place).3?);
-            }
-        }
-        comparisons.push(Comparison {
+    let comparison = |(case, title): &(&Case, &'static str)| {
+        let passes = case.oracle.schedule()?.len();
+        let rows = ROWS
+            .par_iter()
+            .map(|(kind, period_us)| row(&case.with_period_us(*period_us), *kind, passes, step));
+        Ok(Comparison {
             name: case.name,
             title,
             feed_mm_s: case.job.feed_mm_s(),
             scallop_mm: case.job.scallop_mm,
             chord_mm: case.job.chord_mm,
-            rows,
-        });
-    }
-    Ok(comparisons)
+            rows: rows.collect::<Result<_, ApproachError>>()?,
+        })
+    };
+    jobs.par_iter().map(comparison).collect()
 }

@@ -5,6 +5,7 @@
 //!                             ─► examples.rs   Examples 1 to 6 as items: printed, ours, note
 //!                             ─► table_1.rs    operations and cycles of a period
 //!                             ─► compare.rs    the four approaches on whole jobs
+//!                             ─► spacing.rs    constant scallop height beside straight passes, on whole jobs
 //!                             ─► figures.rs    the data of Figures 3, 4, 5, 7, 8, 9
 //! study ─► report/paper/: the page;  commands/paper.rs: terminal and JSON
 //! ```
@@ -16,6 +17,7 @@ pub mod compare;
 mod examples;
 pub mod figures;
 pub mod geometry;
+pub mod spacing;
 pub mod table_1;
 
 use approach::ApproachError;
@@ -24,6 +26,7 @@ use oracle::Oracle;
 
 pub use compare::{Comparison, Row};
 pub use figures::Figures;
+pub use spacing::{SpacingRow, SpacingTable};
 
 /// A number of the paper, or a related one that the paper does not print.
 #[derive(Clone, Debug, PartialEq)]
@@ -156,12 +159,14 @@ pub struct Study {
     pub items: Vec<Item>,
     /// The four approaches on whole jobs.
     pub comparisons: Vec<Comparison>,
+    /// Passes of constant scallop height beside straight ones.
+    pub spacings: Vec<SpacingTable>,
     /// Data of the figures.
     pub figures: Figures,
 }
 
 /// Progress steps of the study.
-pub const STEPS: u64 = 2 + compare::RUNS * compare::PARTS;
+pub const STEPS: u64 = 2 + compare::RUNS * compare::PARTS + spacing::STEPS;
 
 /// Runs the study. `step` is called after each of [`STEPS`] steps, from any thread.
 ///
@@ -170,6 +175,7 @@ pub const STEPS: u64 = 2 + compare::RUNS * compare::PARTS;
 pub fn study(step: &(dyn Fn() + Sync)) -> Result<Study, ApproachError> {
     let cases = Cases::new()?;
     let comparisons = compare::comparisons(&cases, step)?;
+    let spacings = spacing::tables(&cases, step)?;
     let figures = Figures::new(&cases)?;
     step();
     let mut items = examples::items(&cases, &comparisons)?;
@@ -179,6 +185,7 @@ pub fn study(step: &(dyn Fn() + Sync)) -> Result<Study, ApproachError> {
         cases,
         items,
         comparisons,
+        spacings,
         figures,
     })
 }

@@ -75,6 +75,7 @@ pub fn page(study: &Study) -> io::Result<String> {
     );
     text::opening(&mut out, study);
     tables::comparisons(&mut out, study);
+    tables::spacings(&mut out, study);
     text::disagreements(&mut out, study);
     figures::figures(&mut out, study)?;
     scatter::section(&mut out, study)?;

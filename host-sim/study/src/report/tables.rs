@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::{percent, shown};
-use crate::paper::{Comparison, Item, Row, Study};
+use crate::paper::{Comparison, Item, Row, SpacingTable, Study};
 use ::report::number::fixed;
 use ::report::svg::escape;
 use approach::Kind;
@@ -59,6 +59,53 @@ fn table(out: &mut String, comparison: &Comparison) {
             range(&measured.findings.speeds.cc),
             range(&measured.findings.speeds.cl),
             measured.findings.speeds.cl_step_mm_s
+        );
+    }
+    out.push_str("</tbody></table></div>\n");
+}
+
+/// Passes of constant scallop height beside straight ones.
+pub(super) fn spacings(out: &mut String, study: &Study) {
+    out.push_str(
+        "<section><h2>Passes of constant scallop height</h2>\n\
+         <p>The paper's passes are lines of constant parameter, and the narrowest place of a gap sets its width. <code>first-order</code> is \
+         the paper's interval, <code>exact</code> the step over which the limit is kept; with <code>constant</code> each pass is a curve at \
+         the scallop height from the last one, made while the tool is on that, from the surface's edge or from its middle. Crests are those of the \
+         swept ball, as shares of the limit. Zigzag, with the axis limits of <code>jobs/plate_machine.toml</code>: times include rests and \
+         links. Bold: the fastest within the limit.</p>\n",
+    );
+    for table in &study.spacings {
+        spacing(out, table);
+    }
+    out.push_str("</section>\n");
+}
+
+fn spacing(out: &mut String, table: &SpacingTable) {
+    let _ = writeln!(
+        out,
+        "<div class=\"scroll\"><table class=\"wide\"><caption>{} <span class=\"sub\">(feed {} mm/s, scallop {} mm)</span>\
+         </caption>\n<thead><tr><th>passes</th><th>number</th><th>partial</th><th>length<br/>mm</th><th>of<br/>first-order</th>\
+         <th>whole time<br/>min</th><th>of<br/>first-order</th><th>highest<br/>crest</th><th>mean<br/>crest</th></tr></thead><tbody>",
+        escape(table.title),
+        table.feed_mm_s,
+        table.scallop_mm
+    );
+    let fastest = table.fastest();
+    for row in &table.rows {
+        let is_best = fastest == Some(row);
+        let _ = writeln!(
+            out,
+            "<tr{}><th scope=\"row\">{}</th><td>{}</td><td>{}</td><td>{}</td><td>{:.3}</td><td>{:.2}</td><td>{:.3}</td><td>{:.3}</td><td>{:.3}</td></tr>",
+            if is_best { " class=\"best\"" } else { "" },
+            row.name(),
+            row.path.passes,
+            row.path.partial,
+            fixed(row.path.length_mm, 0),
+            table.length_ratio(row),
+            row.path.time_s / 60.0,
+            table.time_ratio(row),
+            row.crest_max,
+            row.crest_mean
         );
     }
     out.push_str("</tbody></table></div>\n");
