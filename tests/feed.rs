@@ -17,6 +17,8 @@ fn axes(safe_z_nm: i32) -> AxisLimits {
         travel_nm: [[i32::MIN, i32::MAX]; 3],
         home_nm: [0, 0, safe_z_nm],
         plunge_mm: 2.0,
+        end_nm: None,
+        end_height_nm: 0,
         safe_z_nm,
     }
 }
@@ -118,6 +120,63 @@ fn check_sample_job(name: &str, times: f32, pattern: Pattern, machine_of: fn(i32
     assert_eq!(last_pass + 1, passes, "{what}");
     used.check(&what);
     assert_eq!(sample.cl_nm, axes.home_nm, "{what}: back where it began");
+}
+
+/// A run that begins straight above its first pass goes down at once, and one that ends elsewhere goes there as high as it is told: neither comes near the safe height. From any
+/// other place the run begins at the safe height.
+#[test]
+fn a_run_between_others_stays_low() {
+    let (mut header, words) = dome();
+    let (top, _) = height(&header, &words);
+    let safe_z_nm = top + 50_000_000;
+    header.axes = Some(axes(safe_z_nm));
+    let run = |header: &Header| {
+        let mut core = machine(header, &words);
+        let mut samples = vec![period(&mut core, Command::Start)];
+        while samples.last().is_some_and(|sample| sample.state.is_under_way()) {
+            samples.push(period(&mut core, None));
+        }
+        assert_eq!(core.fault(), None);
+        samples
+    };
+    let highest = |samples: &[Sample]| samples.iter().map(|sample| sample.cl_nm[2]).max().unwrap();
+    let before = |samples: &[Sample]| {
+        let on_pass = |sample: &Sample| sample.state == State::Running;
+        highest(&samples[..samples.iter().position(on_pass).unwrap()])
+    };
+    let at_home = run(&header);
+    assert_eq!(before(&at_home), safe_z_nm);
+    let on_passes = |samples: &[Sample]| -> Vec<[i32; 3]> {
+        let samples = samples.iter().filter(|sample| sample.state == State::Running);
+        samples.map(|sample| sample.cl_nm).collect()
+    };
+    let [x, y, z] = on_passes(&at_home)[0];
+    let end_nm = [x + 3_000_000, y - 4_000_000, top + 2_000_000];
+    let low = |home_nm: [i32; 3]| {
+        let axes = AxisLimits {
+            home_nm,
+            end_nm: Some(end_nm),
+            end_height_nm: top + 6_000_000,
+            ..axes(safe_z_nm)
+        };
+        run(&Header {
+            axes: Some(axes),
+            ..header
+        })
+    };
+    for beside in [[0, 0], [1_000, -1_000]] {
+        let samples = low([x + beside[0], y + beside[1], z + 1_000_000]);
+        assert_eq!(samples.last().unwrap().cl_nm, end_nm);
+        assert_eq!(before(&samples), z + 1_000_000, "{beside:?}");
+        let links = samples
+            .iter()
+            .rev()
+            .take_while(|sample| sample.state != State::Running);
+        assert_eq!(links.map(|sample| sample.cl_nm[2]).max(), Some(top + 6_000_000));
+        assert_eq!(on_passes(&samples), on_passes(&at_home), "{beside:?}");
+    }
+    let elsewhere = low([x + 1_001, y, z + 1_000_000]);
+    assert_eq!(before(&elsewhere), safe_z_nm);
 }
 
 /// Some jobs, at low and high feed, on a machine with lower limits on z.

@@ -24,6 +24,8 @@ fn within_limits(home_nm: [i32; 3]) -> (Header, Vec<i32>) {
         travel_nm: [[i32::MIN, i32::MAX]; 3],
         home_nm,
         plunge_mm: 2.0,
+        end_nm: None,
+        end_height_nm: 0,
         safe_z_nm: SAFE_Z_NM,
     });
     (header, words)

@@ -66,6 +66,8 @@ fn axes() -> AxisLimits {
         travel_nm: [[-1, 1], [i32::MIN, i32::MAX], [0, 64]],
         home_nm: [1, -2, i32::MAX],
         plunge_mm: 2.0,
+        end_nm: Some([-1, 0, 300]),
+        end_height_nm: 70_000,
         safe_z_nm: 50_000_000,
     }
 }

@@ -139,13 +139,15 @@ fn region() {
     };
     // Links of every kind, some of which begin before their pass is planned.
     let mut with_links = with_limits.clone();
-    let links: Vec<Link> = (machine::links::ends(&with_limits).iter().zip(0..))
-        .map(|([from, to], index)| match index % 3 {
-            0 => Link::Straight,
-            1 => Link::Across(from[2].max(to[2]) + 300_000),
-            _ => Link::Across(i32::MIN + 1),
-        })
-        .collect();
+    let links: Vec<Link> = (machine::links::between(&machine::links::passes(&with_limits))
+        .iter()
+        .zip(0..))
+    .map(|([from, to], index)| match index % 3 {
+        0 => Link::Straight,
+        1 => Link::Across(from[2].max(to[2]) + 300_000),
+        _ => Link::Across(i32::MIN + 1),
+    })
+    .collect();
     machine::links::add(&mut with_links, &links);
     assert!(with_links.header.links > 10);
     compare_prepared(&[

@@ -58,6 +58,8 @@ fn limited() -> (Header, Vec<i32>) {
         travel_nm: [[-100_000_000, 100_000_000]; 3],
         home_nm: [0, 0, 50_000_000],
         plunge_mm: 2.0,
+        end_nm: None,
+        end_height_nm: 0,
         safe_z_nm: 40_000_000,
     });
     (header, words)

@@ -67,6 +67,8 @@ impl Desk {
             travel_nm: [[i32::MIN, i32::MAX]; 3],
             home_nm: [0, 0, 50_000_000],
             plunge_mm: 2.0,
+            end_nm: None,
+            end_height_nm: 0,
             safe_z_nm: 40_000_000,
         });
         for request in upload(header, &words) {

@@ -17,6 +17,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         travel_nm: [[-100_000_000, 100_000_000]; 3],
         home_nm: [0, 0, 30_000_000],
         plunge_mm: 2.0,
+        end_nm: None,
+        end_height_nm: 0,
         safe_z_nm: 15_000_000,
     };
     let header = Header {

@@ -59,7 +59,7 @@ const HEADER_MAX: usize = 192;
 #[derive(Serialize)]
 struct Head(#[serde(with = "HeaderFields")] Header);
 
-/// A mark of a job: its header and the digest of its words. Apart from its home and safe height, which a job without them takes from where the axes stand: its passes are
+/// A mark of a job: its header and the digest of its words. Apart from its home, its end and its safe height, which a job without them takes from where the axes stand: its passes are
 /// the same from anywhere.
 #[must_use]
 #[inline(never)]
@@ -67,7 +67,8 @@ pub fn job_mark(header: &Header, words_digest: u64) -> u64 {
     let mut bytes = [0; HEADER_MAX];
     let mut header = *header;
     if let Some(axes) = &mut header.axes {
-        (axes.home_nm, axes.safe_z_nm) = ([0; 3], 0);
+        (axes.home_nm, axes.end_nm) = ([0; 3], None);
+        (axes.safe_z_nm, axes.end_height_nm) = (0, 0);
     }
     let crc = postcard::to_slice(&Head(header), &mut bytes).map_or(0, |bytes| crc32(bytes));
     words_digest ^ u64::from(crc) << 16

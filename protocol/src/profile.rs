@@ -224,6 +224,8 @@ mod tests {
             travel_nm: PROFILE.travel_nm.unwrap(),
             home_nm: [0; 3],
             plunge_mm: 1.0,
+            end_nm: None,
+            end_height_nm: 0,
             safe_z_nm: 0,
         }
     }

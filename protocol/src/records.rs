@@ -285,6 +285,8 @@ struct AxisLimitsFields {
     chord_mm: f32,
     travel_nm: [[i32; 2]; 3],
     home_nm: [i32; 3],
+    end_nm: Option<[i32; 3]>,
+    end_height_nm: i32,
     plunge_mm: f32,
     safe_z_nm: i32,
     overrun_mm: f32,

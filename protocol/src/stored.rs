@@ -94,6 +94,8 @@ mod tests {
             travel_nm: [[i32::MIN, i32::MAX]; 3],
             home_nm: [i32::MIN; 3],
             plunge_mm: f32::MAX,
+            end_nm: Some([i32::MIN; 3]),
+            end_height_nm: i32::MIN,
             safe_z_nm: i32::MIN,
         };
         let job = StoredJob {

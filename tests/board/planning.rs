@@ -27,6 +27,8 @@ fn limited() -> (interp_core::Header, Vec<i32>) {
         travel_nm: [[i32::MIN, i32::MAX]; 3],
         home_nm: [0, 0, 50_000_000],
         plunge_mm: 2.0,
+        end_nm: None,
+        end_height_nm: 0,
         safe_z_nm: 40_000_000,
     });
     (header, words)

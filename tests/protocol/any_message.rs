@@ -25,7 +25,7 @@ fn real() -> impl Strategy<Value = f32> {
 
 prop_compose! {
     fn any_axes()(reals in prop::array::uniform12(real()), travel_nm in any::<[[i32; 2]; 3]>(), home_nm in any::<[i32; 3]>(),
-                  safe_z_nm: i32) -> AxisLimits {
+                  end_nm in any::<Option<[i32; 3]>>(), [safe_z_nm, end_height_nm] in any::<[i32; 2]>()) -> AxisLimits {
         let [vx, vy, vz, ax, ay, az, jx, jy, jz, chord_mm, plunge_mm, overrun_mm] = reals;
         AxisLimits {
             velocity_mm_s: [vx, vy, vz],
@@ -34,6 +34,8 @@ prop_compose! {
             chord_mm,
             travel_nm,
             home_nm,
+            end_nm,
+            end_height_nm,
             plunge_mm,
             safe_z_nm,
             overrun_mm,

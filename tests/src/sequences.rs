@@ -165,6 +165,8 @@ impl Course {
             travel_nm: [[i32::MIN, i32::MAX]; 3],
             home_nm: [0, 0, safe_z_nm],
             plunge_mm: 2.0,
+            end_nm: None,
+            end_height_nm: 0,
             safe_z_nm,
         });
         let name = format!("dome {feed_mm_s} {pattern:?} {overrun_mm} {spacing:?}");

@@ -250,6 +250,8 @@ mod tests {
             travel_nm: [[i32::MIN, i32::MAX]; 3],
             home_nm,
             plunge_mm: 1.0,
+            end_nm: None,
+            end_height_nm: 0,
             safe_z_nm: 20_000_000,
         });
         let header = Header {

@@ -19,30 +19,36 @@ pub enum Link {
     Across(i32),
 }
 
-/// The ball's centre at the end of each pass and at the start of the next, nm, up to the end of the run or a fault. Empty without axis limits.
+/// The ball's centre at the start and at the end of each pass, nm, up to the end of the run or a fault. Empty without axis limits.
 #[must_use]
-pub fn ends(prepared: &Prepared) -> Vec<[[i32; 3]; 2]> {
-    let mut ends = Vec::new();
+pub fn passes(prepared: &Prepared) -> Vec<[[i32; 3]; 2]> {
+    let mut passes: Vec<[[i32; 3]; 2]> = Vec::new();
     if prepared.header.axes.is_none() {
-        return ends;
+        return passes;
     }
     let Ok(mut machine) = Machine::load(prepared) else {
-        return ends;
+        return passes;
     };
-    let mut last: Option<(u32, [i32; 3])> = None;
-    // Of a run that faults the links up to there count.
+    let mut present = None;
+    // Of a run that faults the passes up to there count.
     let _fault = machine.run(|sample| {
         if sample.state == State::Running {
-            if let Some((pass, cl_nm)) = last
-                && pass != sample.pass
-            {
-                ends.push([cl_nm, sample.cl_nm]);
+            match passes.last_mut() {
+                Some([_, end]) if present == Some(sample.pass) => *end = sample.cl_nm,
+                _ => passes.push([sample.cl_nm; 2]),
             }
-            last = Some((sample.pass, sample.cl_nm));
+            present = Some(sample.pass);
         }
         true
     });
-    ends
+    passes
+}
+
+/// The end of each pass and the start of the next.
+#[must_use]
+pub fn between<T: Copy>(passes: &[[T; 2]]) -> Vec<[T; 2]> {
+    let pairs = passes.windows(2);
+    pairs.map(|pair| [pair[0][1], pair[1][0]]).collect()
 }
 
 /// Gives a job the words of its links, the first one that to the second pass: as many as fit into the board's store; the others go at the safe height.

@@ -33,7 +33,7 @@ pub use clear::{Clearance, Place};
 pub use contour::{Precision, Set};
 pub use faces::{Asked, Faces, own_face, part_of, placed_part, placement};
 pub use inside::Inside;
-pub use links::{Way, ways};
+pub use links::{Crossings, Times, Way, crossing, passes, ways};
 pub use picture::State;
 pub use proof::{Deepest, LEFTOVER_SHARE, LEFTOVER_SIDE, Leftover, Passes, along, deepest, leftover};
 pub use region::{GROWTH, Made, Request, STEP_MAX};

@@ -60,6 +60,30 @@ pub enum Way {
     Across(f64),
 }
 
+/// The ball's centre at the start and at the end of each pass of a job, nm; `make` is called where they are not kept beside the job, by a digest of `key`.
+///
+/// # Errors
+/// None: `make` has none.
+pub fn passes(
+    job: &Job,
+    key: &[u8],
+    make: impl FnOnce() -> Vec<[[i32; 3]; 2]>,
+) -> Result<Vec<[[i32; 3]; 2]>, FaceError> {
+    cached(job, "passes", &[key], None, || Ok(make()))
+}
+
+/// The least height at which the tool of a job crosses the part between two places of the ball's centre, mm, at most the safe height; the safe height where no part is known.
+///
+/// # Errors
+/// The part's file cannot be read.
+pub fn crossing(job: &Job, safe_mm: f64, ends: [DVec3; 2]) -> Result<f64, FaceError> {
+    let Some(of) = job.origin.part() else {
+        return Ok(safe_mm);
+    };
+    let part = part_of(job, of)?;
+    Ok(Crossings::new(&part, &Tool::of(job), of.tolerance_mm, safe_mm).height(ends))
+}
+
 /// The ways of the links of a job with these ends, the ball's centre in mm; `ends` is called where they are not kept beside the job, by a digest of all that they
 /// depend on: of `key` among it. No height is above the safe height.
 ///
@@ -92,30 +116,22 @@ pub fn ways(
                 (&alone, DEPTH_MM)
             }
         };
-        let clear = Links {
-            part,
-            tool: tool.wide(),
-            depth,
-            safe_mm,
-            may_stay_low: of_part.is_some(),
-            times: Times {
-                feed_mm_s: job.feed_mm_s(),
-                limits: job.machine.limits.unwrap_or(AxisLimits::DEFAULT),
-            },
-            straight_mm: of_part.map_or(0.0, |_| {
-                STRAIGHT_STEPS * (8.0 * job.radius_mm * job.scallop_mm).sqrt()
-            }),
-        };
+        let clear = Links::over(part, job, depth, safe_mm);
         Ok(ends.par_iter().map(|ends| clear.way(*ends)).collect())
     })
 }
 
-struct Links<'a> {
+/// Where a tool is clear of a part.
+pub struct Crossings<'a> {
     part: &'a Part,
     tool: Tool,
     /// How deep the tool may enter, mm.
     depth: f64,
     safe_mm: f64,
+}
+
+struct Links<'a> {
+    crossings: Crossings<'a>,
     /// The longest straight link, mm.
     straight_mm: f64,
     /// The job knows the part, so that a way may stay low.
@@ -124,12 +140,19 @@ struct Links<'a> {
 }
 
 /// The machine's limits, for the times of ways.
-struct Times {
+#[derive(Clone, Copy, Debug)]
+pub struct Times {
     feed_mm_s: f64,
     limits: AxisLimits,
 }
 
 impl Times {
+    /// At this feed, within these limits.
+    #[must_use]
+    pub const fn new(feed_mm_s: f64, limits: AxisLimits) -> Self {
+        Self { feed_mm_s, limits }
+    }
+
     /// Of a move from rest to rest.
     fn of(length: f64, [velocity, acceleration, jerk]: [f64; 3]) -> f64 {
         let by_jerk = (32.0 * length / jerk).cbrt();
@@ -145,8 +168,9 @@ impl Times {
         self.limits.by_order().map(|limit| limit[k])
     }
 
-    /// Up to a height, across, and down.
-    fn across(&self, [from, to]: [DVec3; 2], height: f64) -> f64 {
+    /// Up to a height, across, and down, s.
+    #[must_use]
+    pub fn across(&self, [from, to]: [DVec3; 2], height: f64) -> f64 {
         let beside = (to - from).truncate().length();
         let up = |z: f64| Self::of((height - z).max(0.0), self.axis(2));
         up(from.z) + Self::of(beside, self.axis(0)) + up(to.z)
@@ -165,13 +189,31 @@ impl Times {
     }
 }
 
-impl Links<'_> {
+impl<'a> Links<'a> {
+    /// Over the part of a job, or over its surface.
+    fn over(part: &'a Part, job: &Job, depth: f64, safe_mm: f64) -> Self {
+        let of_part = job.origin.part();
+        Self {
+            crossings: Crossings {
+                part,
+                tool: Tool::of(job).wide(),
+                depth,
+                safe_mm,
+            },
+            may_stay_low: of_part.is_some(),
+            times: Times::new(job.feed_mm_s(), job.machine.limits.unwrap_or(AxisLimits::DEFAULT)),
+            straight_mm: of_part.map_or(0.0, |_| {
+                STRAIGHT_STEPS * (8.0 * job.radius_mm * job.scallop_mm).sqrt()
+            }),
+        }
+    }
+
     fn way(&self, ends: [DVec3; 2]) -> Way {
         let [from, to] = ends;
-        if from.distance(to) <= self.straight_mm && self.is_clear([from, to], STEP_MM) {
+        if from.distance(to) <= self.straight_mm && self.crossings.is_clear([from, to], STEP_MM) {
             return Way::Straight;
         }
-        let height = self.height(ends);
+        let height = self.crossings.height(ends);
         let over = Way::Across(height);
         let around = self
             .may_stay_low
@@ -191,7 +233,7 @@ impl Links<'_> {
             let place = from.lerp(to, 0.5) + UNIT_MM * (aside * left + rise * DVec3::Z);
             let way = [from, place, to];
             let time_s = self.times.at_feed(&way);
-            if time_s + SAVED_S < than_s && place.z <= self.safe_mm {
+            if time_s + SAVED_S < than_s && place.z <= self.crossings.safe_mm {
                 #[allow(
                     clippy::cast_possible_truncation,
                     clippy::cast_sign_loss,
@@ -211,18 +253,38 @@ impl Links<'_> {
         ways.sort_by(|a, b| a.0.total_cmp(&b.0));
         let is_clear = |way: &[DVec3; 3]| {
             let [from, place, to] = *way;
-            self.is_clear([from, place], STEP_MM) && self.is_clear([place, to], STEP_MM)
+            self.crossings.is_clear([from, place], STEP_MM) && self.crossings.is_clear([place, to], STEP_MM)
         };
         ways.into_iter()
             .find(|(_, way, _)| is_clear(way))
             .map(|(_, _, way)| way)
     }
+}
 
-    /// The least height at which the tool crosses.
-    fn height(&self, [from, to]: [DVec3; 2]) -> f64 {
+impl<'a> Crossings<'a> {
+    /// Of a part that the tool may enter as deep as its regions permit.
+    #[must_use]
+    pub fn new(part: &'a Part, tool: &Tool, tolerance_mm: f64, safe_mm: f64) -> Self {
+        Self {
+            part,
+            tool: tool.wide(),
+            depth: DEPTH_SHARE * tolerance_mm,
+            safe_mm,
+        }
+    }
+
+    /// The least height of a way between two places where nothing is in between, mm.
+    #[must_use]
+    pub fn least_height(&self, [from, to]: [DVec3; 2]) -> f64 {
+        (from.z.max(to.z) + LIFT_MM).min(self.safe_mm)
+    }
+
+    /// The least height at which the tool crosses, mm, at most the safe height.
+    #[must_use]
+    pub fn height(&self, [from, to]: [DVec3; 2]) -> f64 {
         let at = |z: f64| [from, to].map(|end| DVec3::new(end.x, end.y, z));
         let is_clear = |z: f64| self.is_clear(at(z), STRIDE_MM);
-        let least = from.z.max(to.z) + LIFT_MM;
+        let least = self.least_height([from, to]);
         if least >= self.safe_mm {
             return self.safe_mm;
         }

@@ -6,6 +6,7 @@ mod attach;
 mod axes;
 #[cfg(feature = "developer")]
 mod budget;
+mod chain;
 mod completions;
 mod error_json;
 mod explain;

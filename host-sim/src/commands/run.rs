@@ -11,6 +11,7 @@ use interp_core::FaultKind;
 use protocol::message::{JobName, Request};
 use serde_json::{Value, json};
 
+use super::chain::{self, Stop};
 use super::flash::board_parser;
 use super::home::{self, PositionNm};
 use super::operate::sentence;
@@ -107,14 +108,22 @@ struct Target {
     port: Option<String>,
 }
 
-/// Position to declare: that of `--home`; without axes (in QEMU, on models of a chip), by default the start of the job.
-fn declared(arguments: &Arguments, prepared: &Prepared) -> Option<PositionNm> {
+/// Position to declare before the first run: that of `--home`; without axes (in QEMU, on models of a chip), by default the start of the job.
+fn declared(arguments: &Arguments, prepared: &Prepared, has_run: bool) -> Option<PositionNm> {
+    if has_run {
+        return None;
+    }
     let simulated = arguments.target.port.is_none().then(|| home::of(prepared));
     arguments.home.or(simulated)
 }
 
 /// Configures the board, switches its drives on, and declares home if the position is known.
-fn make_ready(arguments: &Arguments, job: &Job, prepared: &Prepared, session: &mut Session) -> Result<()> {
+fn make_ready(
+    arguments: &Arguments,
+    (job, prepared): (&Job, &Prepared),
+    has_run: bool,
+    session: &mut Session,
+) -> Result<()> {
     let status = session.status()?;
     if let (true, Some(port)) = (status.state.is_under_way(), &arguments.target.port) {
         return Err(Failure::Failed(Some(format!(
@@ -124,7 +133,7 @@ fn make_ready(arguments: &Arguments, job: &Job, prepared: &Prepared, session: &m
     }
     let setup = Setup {
         configuration: prepare::configuration(&job.machine),
-        home_nm: declared(arguments, prepared).map(|position| position.0),
+        home_nm: declared(arguments, prepared, has_run).map(|position| position.0),
     };
     Ok(operate::make_ready(session, &setup)?)
 }
@@ -153,6 +162,8 @@ fn check_period(job: &Job, session: &Session) -> Result<()> {
 struct Bench {
     /// The line to a board.
     connected: Option<Connected>,
+    /// A face has been run: the board knows where the axes stand.
+    has_run: bool,
     /// Of `--machine`, or the one that the board keeps.
     profile: Option<MachineProfile>,
     /// The origin of the job, in machine coordinates.
@@ -165,6 +176,7 @@ fn bench(arguments: &Arguments) -> Result<Bench> {
     let given = read_profile(arguments.machine.as_ref())?;
     let mut bench = Bench {
         connected: None,
+        has_run: false,
         profile: given,
         origin: arguments.placed.origin,
         stands: arguments.home,
@@ -221,9 +233,11 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         ));
     }
     let mut bench = bench(arguments)?;
+    let (profile, origin, stands) = (bench.profile, bench.origin, bench.stands);
+    let stops = chain::stops(&jobs, |path| home::load(path, profile.as_ref(), origin, stands))?;
     let (mut values, mut failure) = (Vec::new(), None);
-    for path in &jobs {
-        let ran = run_job(arguments, path, several, &mut bench)?;
+    for (path, stop) in jobs.iter().zip(stops) {
+        let ran = run_job(arguments, (path, stop), several, &mut bench)?;
         values.push(ran.value);
         failure = ran.failure;
         if failure.is_some() {
@@ -264,9 +278,16 @@ struct Ran {
     failure: Option<String>,
 }
 
-fn run_job(arguments: &Arguments, path: &Path, several: bool, bench: &mut Bench) -> Result<Ran> {
+fn run_job(
+    arguments: &Arguments,
+    (path, stop): (&Path, Stop),
+    several: bool,
+    bench: &mut Bench,
+) -> Result<Ran> {
     let (profile, origin) = (bench.profile, bench.origin);
-    let (job, mut prepared) = home::load(path, profile.as_ref(), origin, bench.stands)?;
+    let has_run = std::mem::replace(&mut bench.has_run, true);
+    let (mut job, mut prepared) = home::load(path, profile.as_ref(), origin, bench.stands)?;
+    stop.apply(&mut job, &mut prepared);
     if let (true, Some((_, session))) = (arguments.resume, &mut bench.connected) {
         prepared.start = resume::start(session, &prepared)?;
     }
@@ -296,7 +317,7 @@ fn run_job(arguments: &Arguments, path: &Path, several: bool, bench: &mut Bench)
         let scripted = scripted::play(&job, &prepared, script, None)?;
         let session = session_of(arguments, bench)?;
         check_period(&job, session)?;
-        make_ready(arguments, &job, &prepared, session)?;
+        make_ready(arguments, (&job, &prepared), has_run, session)?;
         drive::upload(session, &prepared, |_| {})?;
         scripted.run(&job, session, arguments.json)?;
         return Ok(Ran {
@@ -314,7 +335,7 @@ fn run_job(arguments: &Arguments, path: &Path, several: bool, bench: &mut Bench)
     }
     let session = session_of(arguments, bench)?;
     check_period(&job, session)?;
-    make_ready(arguments, &job, &prepared, session)?;
+    make_ready(arguments, (&job, &prepared), has_run, session)?;
     let bar = progress(prepared.words.len() as u64, "uploading");
     drive::upload(session, &prepared, |words| bar.set_position(words as u64))?;
     bar.finish_and_clear();

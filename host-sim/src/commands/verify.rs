@@ -13,6 +13,7 @@ use verify::Verdict;
 use verify::survey::{SampleObserver, SurveyResult};
 use verify::swept;
 
+use super::chain::{self, Stop};
 use super::out::{complain, say};
 use super::part_words::{Centres, PartProof};
 use super::simulate::{WantedReport, remarks, report, timed};
@@ -260,10 +261,12 @@ fn original(job: &Job) -> Result<Option<(Box<swept::OriginalOffset<'static>>, f6
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let mut jobs = Vec::new();
     for path in &arguments.jobs {
-        jobs.extend(job_file::jobs_of(path)?);
+        let faces = job_file::jobs_of(path)?;
+        let stops = chain::stops(&faces, |face| load(arguments, face))?;
+        jobs.extend(faces.into_iter().zip(stops));
     }
-    if let [job] = jobs.as_slice() {
-        let (passed, value) = verify_job(arguments, job, arguments.report.as_deref())?;
+    if let [(job, stop)] = jobs.as_slice() {
+        let (passed, value) = verify_job(arguments, job, *stop, arguments.report.as_deref())?;
         if arguments.json {
             say!("{value}");
         }
@@ -274,12 +277,12 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         };
     }
     let (mut values, mut all_passed, mut refused) = (Vec::new(), true, None);
-    for job in &jobs {
+    for (job, stop) in &jobs {
         let directory = arguments
             .report
             .as_ref()
             .map(|directory| directory.join(job.file_stem().unwrap_or(job.as_os_str())));
-        match verify_job(arguments, job, directory.as_deref()) {
+        match verify_job(arguments, job, *stop, directory.as_deref()) {
             Ok((passed, value)) => {
                 all_passed &= passed;
                 values.push(value);
@@ -338,10 +341,20 @@ fn summary(values: &[Value]) {
     );
 }
 
-/// Verifies one job and prints its figures unless JSON is requested. Returns whether it passed, and its JSON object.
-fn verify_job(arguments: &Arguments, path: &Path, directory: Option<&Path>) -> Result<(bool, Value)> {
+fn load(arguments: &Arguments, path: &Path) -> Result<(Job, Prepared)> {
     let profile = read_profile(arguments.machine.as_ref())?;
-    let (job, prepared) = home::load(path, profile.as_ref(), arguments.placed.origin, None)?;
+    home::load(path, profile.as_ref(), arguments.placed.origin, None)
+}
+
+/// Verifies one job and prints its figures unless JSON is requested. Returns whether it passed, and its JSON object.
+fn verify_job(
+    arguments: &Arguments,
+    path: &Path,
+    stop: Stop,
+    directory: Option<&Path>,
+) -> Result<(bool, Value)> {
+    let (mut job, mut prepared) = load(arguments, path)?;
+    stop.apply(&mut job, &mut prepared);
     let directory = WantedReport::new(directory, arguments.force)?;
     let timed = timed(&job, &prepared)?;
     let original = original(&job)?;

@@ -119,6 +119,8 @@ mod tests {
     #[test]
     fn words() {
         let axes = AxisLimits {
+            end_nm: None,
+            end_height_nm: 0,
             safe_z_nm: 5_000_000,
             ..AxisLimits::default()
         };

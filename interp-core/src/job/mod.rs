@@ -160,6 +160,10 @@ pub struct AxisLimits {
     pub travel_nm: [[i32; 2]; 3],
     /// Home: position of the tool centre before the first run, nm; within the travel.
     pub home_nm: [i32; 3],
+    /// Where a run ends, nm, if not at home; within the travel.
+    pub end_nm: Option<[i32; 3]>,
+    /// Height of the way to [`Self::end_nm`], nm, or that of the last pass's end where that is higher; within the travel.
+    pub end_height_nm: i32,
     /// Length of the end of the plunge, mm, 0 to 1000, over which the speed does not exceed the feed.
     pub plunge_mm: f32,
     /// Safe height (z of the tool centre), nm, above every point of the surface; within the travel.

@@ -170,13 +170,19 @@ fn check_axes(header: &Header, axes: &AxisLimits) -> Result<()> {
     if usize::from(header.path_spans) > CELLS_MAX {
         return bad(f32::from(header.path_spans));
     }
-    let [x, y, z] = axes.home_nm;
-    for (place, [least, most]) in [x, y, z, axes.safe_z_nm]
-        .into_iter()
-        .zip(axes.travel_nm.into_iter().chain([axes.travel_nm[2]]))
-    {
-        if !(least..=most).contains(&place) {
-            return bad(nm_to_mm(place));
+    let [x, y, _] = axes.home_nm;
+    let end_nm = axes.end_nm.unwrap_or(axes.home_nm);
+    let end_height_nm = axes.end_nm.map_or(axes.safe_z_nm, |_| axes.end_height_nm);
+    for place in [
+        axes.home_nm,
+        end_nm,
+        [x, y, axes.safe_z_nm],
+        [x, y, end_height_nm],
+    ] {
+        for (place, [least, most]) in place.into_iter().zip(axes.travel_nm) {
+            if !(least..=most).contains(&place) {
+                return bad(nm_to_mm(place));
+            }
         }
     }
     Ok(())

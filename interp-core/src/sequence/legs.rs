@@ -11,6 +11,9 @@ use crate::sequence::link::check_faces_up;
 use crate::sequence::lookahead::check_travel;
 use crate::sequence::sequencer::{FeedCommand, Phase, Planning, Sequencer, both};
 
+/// What counts as straight above, nm.
+const BESIDE_NM: u32 = 1_000;
+
 /// A straight leg off the surface, towards the goal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Leg {
@@ -24,8 +27,8 @@ pub(super) enum Leg {
 pub(super) enum Goal {
     /// The start of the next pass.
     Pass,
-    /// The position at which the first run began.
-    Home,
+    /// The end of the run: home, or where the job ends instead.
+    End,
     /// The safe height, above the tool's position.
     SafeHeight,
     /// The same, to wait there.
@@ -43,6 +46,12 @@ pub(super) enum LegPlanning {
     Complete,
     /// The leg must not begin.
     Refused(Fault),
+}
+
+/// Whether a place is straight above another: up to a micrometre, for a place in the coordinates of a work offset.
+fn is_above(place: &[i32; 3], other: &[i32; 3]) -> bool {
+    let ([x, y, z], [other_x, other_y, other_z]) = (place, other);
+    x.abs_diff(*other_x) <= BESIDE_NM && y.abs_diff(*other_y) <= BESIDE_NM && z >= other_z
 }
 
 impl Sequencer {
@@ -91,12 +100,14 @@ impl Sequencer {
         let from = self.at.unwrap_or(axes.home_nm);
         let [x, y, z] = match self.goal {
             Goal::Pass => next.ends[0],
-            Goal::Home => axes.home_nm,
+            Goal::End => axes.end_nm.unwrap_or(axes.home_nm),
             Goal::SafeHeight | Goal::Lift => from,
             Goal::Back => self.back.at,
         };
         let link = match self.goal {
             Goal::Pass if self.on_surface => job.link_to(now.pass.wrapping_add(1), axes),
+            Goal::Pass if is_above(&from, &[x, y, z]) => Link::Across(from[2]),
+            Goal::End if axes.end_nm.is_some() => Link::Across(axes.end_height_nm),
             _ => Link::Across(axes.safe_z_nm),
         };
         // A low link that could not begin in time goes at the safe height.
@@ -150,7 +161,7 @@ impl Sequencer {
     /// Chooses what follows a leg. The plunge to a pass is left by [`Self::enter_pass`].
     fn end_leg(&mut self, leg: Leg) {
         match (leg, self.goal) {
-            (Leg::Retract, Goal::SafeHeight) | (Leg::Plunge, Goal::Home | Goal::SafeHeight) => {
+            (Leg::Retract, Goal::SafeHeight) | (Leg::Plunge, Goal::End | Goal::SafeHeight) => {
                 self.phase = Phase::Done;
             }
             (Leg::Retract, Goal::Lift) => self.phase = Phase::Lifted,

@@ -75,6 +75,8 @@ pub(super) fn axes(job: &Job, tool_sign: f64, start: [f64; 2]) -> Result<Option<
         chord_mm: job.chord_mm as f32,
         travel_nm,
         home_nm,
+        end_nm: None,
+        end_height_nm: safe_z_nm,
         plunge_mm: machine.plunge_mm as f32,
         safe_z_nm,
         overrun_mm: job.overrun_mm as f32,

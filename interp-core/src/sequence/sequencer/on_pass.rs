@@ -156,7 +156,7 @@ impl Sequencer {
         let (now, next) = both(&mut self.plans, self.second);
         if now.is_last {
             check_faces_up(now.faces_up[1])?;
-            self.goal = Goal::Home;
+            self.goal = Goal::End;
             self.await_goal(Leg::Retract);
         } else if stays {
             self.phase = Phase::Await;

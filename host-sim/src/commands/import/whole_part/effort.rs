@@ -25,6 +25,8 @@ pub(super) struct Passes<'a> {
     pub(super) region: &'a Region,
     pub(super) step_over_mm: f64,
     pub(super) feed_mm_s: f64,
+    /// Every other pass goes back.
+    pub(super) is_zigzag: bool,
     /// Places of the face, each with its area.
     pub(super) places: &'a [([f64; 2], f64)],
 }
@@ -36,6 +38,8 @@ pub(super) struct Effort {
     pub(super) time_s: f64,
     /// Share of the places that they leave too high.
     pub(super) left: f64,
+    /// (u, v) at the start of the first and at the end of the last one.
+    pub(super) ends: Option<[[f64; 2]; 2]>,
 }
 
 /// A line of constant side parameter, and its intervals.
@@ -106,7 +110,22 @@ impl Passes<'_> {
             along,
             time_s,
             left: self.left(along, &lines),
+            ends: self.ends(along, &lines),
         }
+    }
+
+    /// (u, v) at the start of the first pass and at the end of the last one.
+    fn ends(&self, along: Along, lines: &[Line]) -> Option<[[f64; 2]; 2]> {
+        let passes = || lines.iter().filter(|line| !line.intervals.is_empty());
+        let (first, last) = (passes().next()?, passes().next_back()?);
+        let [start, _] = first.intervals.first()?;
+        let goes_back = self.is_zigzag && passes().count() % 2 == 0;
+        let end = if goes_back {
+            last.intervals.first()?[0]
+        } else {
+            last.intervals.last()?[1]
+        };
+        Some([[*start, first.side], [end, last.side]].map(|place| swapped(along, place)))
     }
 
     /// A line, the longest derivative across it, and its time.
@@ -185,6 +204,7 @@ mod tests {
             region: &region,
             step_over_mm: 0.5,
             feed_mm_s: 20.0,
+            is_zigzag: true,
             places: &places,
         };
         let [u, v] = [Along::U, Along::V].map(|along| passes.effort(along));

@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use cad::{CadError, Face, JobOptions, MachinableFace, Placement, write_job};
-use job::{Along, FaceReach, Region, SurfaceSpec};
+use glam::DVec3;
+use job::{Along, FaceReach, Pattern, Region, SurfaceSpec};
 use part::{Inside, Part, Request, Tool};
 
 use super::super::{Arguments, relative};
@@ -23,8 +24,8 @@ pub(super) struct Outcome {
     pub(super) refused: Option<String>,
     pub(super) region: Option<(Region, SurfaceSpec)>,
     pub(super) job: Option<PathBuf>,
-    /// Highest z of the region, mm.
-    pub(super) top_mm: f64,
+    /// The ball's centre at the start of the first pass and at the end of the last, about, mm.
+    pub(super) ends_mm: [DVec3; 2],
     pub(super) text: String,
     /// Direction of the passes and side of the tool, as in job files, and the time of the passes about, s.
     pub(super) along: &'static str,
@@ -115,7 +116,7 @@ pub(super) fn outcome(
         refused: None,
         region: None,
         job: None,
-        top_mm: f64::NEG_INFINITY,
+        ends_mm: [DVec3::ZERO; 2],
         text: String::new(),
         along: "u",
         side: if face.sense > 0.0 { "+" } else { "-" },
@@ -174,12 +175,6 @@ pub(super) fn outcome(
             }
             if let Some(region) = job.region {
                 let surface = oracle::Surface::new(&job.surface);
-                let heights = region
-                    .loops
-                    .iter()
-                    .flatten()
-                    .map(|[u, v]| surface.at(*u, *v).point.z);
-                outcome.top_mm = heights.fold(f64::NEG_INFINITY, f64::max);
                 let step_over_mm = (8.0 * job.radius_mm * job.scallop_mm).sqrt();
                 let inside = Inside::new(&region.loops);
                 let mut places = asked.of(face, made, |request| {
@@ -191,6 +186,7 @@ pub(super) fn outcome(
                     region: &region,
                     step_over_mm,
                     feed_mm_s: job.feed_mm_min / 60.0,
+                    is_zigzag: job.pattern == Pattern::Zigzag,
                     places: &places,
                 };
                 let best = match arguments.along.as_deref() {
@@ -203,6 +199,13 @@ pub(super) fn outcome(
                     Along::V => "v",
                 };
                 outcome.passes_s = best.time_s;
+                outcome.ends_mm = best.ends.map_or([DVec3::ZERO; 2], |ends| {
+                    ends.map(|[u, v]| {
+                        let at = surface.at(u, v);
+                        let normal = at.u.cross(at.v).normalize_or_zero() * face.sense;
+                        at.point + normal * job.radius_mm
+                    })
+                });
                 outcome.region = Some((region, job.surface));
                 outcome.text = match &arguments.along {
                     Some(_) => text,

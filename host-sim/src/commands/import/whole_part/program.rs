@@ -35,8 +35,7 @@ pub(super) fn program(
             setup.translate_mm
         );
     }
-    let block = setup.part.block();
-    let middle = 0.5 * (block.low + block.high);
+    let home = setup.home_mm(radius_mm);
     let _ = write!(
         out,
         "\n[tool]\nkind = \"ball\"\nradius_mm = {radius_mm}\n\n\
@@ -45,14 +44,14 @@ pub(super) fn program(
          scallop_mm = {}             # scallop height limit between passes\n\
          pattern = \"{}\"\n\n\
          [machine]\n{}\
-         home_mm = [{:.3}, {:.3}, {:.3}]    # where the ball's centre stands before, between and after the faces\n",
+         home_mm = [{:.3}, {:.3}, {:.3}]    # where the ball's centre stands before and after the faces\n",
         arguments.feed_mm_min.unwrap_or(cad::FEED_MM_MIN),
         setup.scallop_mm,
         arguments.pattern.as_deref().unwrap_or("zigzag"),
         cad::LIMITS,
-        middle.x,
-        middle.y,
-        block.high.z + radius_mm + job::CLEARANCE_DEFAULT_MM,
+        home.x,
+        home.y,
+        home.z,
     );
     for index in order {
         let outcome = &outcomes[*index];

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use cad::{CadError, Face, MachinableFace, Model, Placement};
 use clap::ValueEnum;
+use glam::DVec3;
 use part::{Part, Tool, placed_part};
 use patches::placement::Rotation;
 
@@ -104,6 +105,15 @@ impl Setup {
             setup.part = placed_part(model, &setup.placement);
         }
         setup
+    }
+}
+
+impl Setup {
+    /// Where a ball's centre stands before and after the faces: above the middle of the part, as high as links go at most, mm.
+    pub(super) fn home_mm(&self, radius_mm: f64) -> DVec3 {
+        let block = self.part.block();
+        let middle = 0.5 * (block.low + block.high);
+        middle.with_z(block.high.z + radius_mm + job::CLEARANCE_DEFAULT_MM)
     }
 }
 

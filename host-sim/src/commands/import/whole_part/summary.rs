@@ -54,7 +54,7 @@ pub(super) fn summary(
     arguments: &Arguments,
     file: &str,
     setup: &Setup,
-    order: &[usize],
+    (order, links_s): (&[usize], f64),
     outcomes: &[Outcome],
     sums: &Sums,
     page: &Path,
@@ -79,6 +79,7 @@ pub(super) fn summary(
         "reachable_mm2": sums.reachable,
         "region_mm2": sums.region,
         "unreachable": sums.unreachable.iter().map(|(reason, area)| json!({ "reason": reason, "area_mm2": area })).collect::<Vec<_>>(),
+        "links_between_faces_s": links_s,
         "faces_not_known": sums.unknown,
         "faces": outcomes.iter().map(face).collect::<Vec<_>>(),
     })
@@ -88,7 +89,7 @@ pub(super) fn print(
     file: &str,
     page: &Path,
     setup: &Setup,
-    order: &[usize],
+    (order, links_s): (&[usize], f64),
     outcomes: &[Outcome],
     sums: &Sums,
 ) {
@@ -131,5 +132,6 @@ pub(super) fn print(
         "  passes       about {:.1} min; `verify` tells the time",
         passes_s / 60.0
     );
+    say!("  links        between faces about {links_s:.1} s");
     say!("  page         {}", page.display());
 }

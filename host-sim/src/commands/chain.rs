@@ -1,0 +1,162 @@
+//! The faces of a job of many, one after the other: the run of a face ends straight above the start of the next one, as low as the part allows, and that one begins there.
+//!
+//! Where something else than the part may be in the way, or the part is not known, each run begins and ends at the job's home.
+
+use job::Job;
+use machine::prepare::Prepared;
+use rayon::prelude::*;
+
+use super::link_words::{is_alone, millimetres, nanometres_up, passes};
+use super::{Failure, Result};
+
+/// Where the run of a face begins and ends. The default: at its job's home.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Stop {
+    /// Its home, nm, if not the job's.
+    home_nm: Option<[i32; 3]>,
+    /// Where it ends, if not at its home, and at which height it goes there, nm.
+    end_nm: Option<([i32; 3], i32)>,
+}
+
+impl Stop {
+    /// Makes a job's run begin and end here.
+    pub(super) fn apply(self, job: &mut Job, prepared: &mut Prepared) {
+        let Some(axes) = &mut prepared.header.axes else {
+            return;
+        };
+        if let Some(home_nm) = self.home_nm {
+            axes.home_nm = home_nm;
+            job.machine.home_mm = Some(millimetres(home_nm).to_array());
+        }
+        if let Some((end_nm, height_nm)) = self.end_nm {
+            (axes.end_nm, axes.end_height_nm) = (Some(end_nm), height_nm);
+        }
+    }
+}
+
+/// What of a face decides where its neighbours' runs end and begin.
+struct Visit {
+    job: Job,
+    home_nm: [i32; 3],
+    safe_nm: i32,
+    /// The ball's centre at the start of the first pass and at the end of the last.
+    ends_nm: [[i32; 3]; 2],
+}
+
+impl Visit {
+    /// `None` where the run has to begin and end at home.
+    fn new((job, prepared): (Job, Prepared)) -> Result<Option<Self>> {
+        let Some(axes) = prepared.header.axes.filter(|_| is_alone(&job)) else {
+            return Ok(None);
+        };
+        let passes = passes(&job, &prepared)?;
+        let ends = passes.first().zip(passes.last());
+        Ok(ends.map(|([start, _], [_, end])| Self {
+            home_nm: axes.home_nm,
+            safe_nm: axes.safe_z_nm,
+            ends_nm: [*start, *end],
+            job,
+        }))
+    }
+
+    /// Where the run ends and the next begins: straight above the start of the next.
+    fn stop_before(&self, next: &Self) -> Result<[i32; 3]> {
+        let safe_nm = self.safe_nm.max(next.safe_nm);
+        let ([_, from], [to, _]) = (self.ends_nm, next.ends_nm);
+        let [_, _, safe_mm] = millimetres([0, 0, safe_nm]).to_array();
+        let height_mm = part::crossing(&self.job, safe_mm, [from, to].map(millimetres))
+            .map_err(|error| Failure::input(error.what, error.remedy))?;
+        let [x, y, _] = to;
+        Ok([x, y, nanometres_up(height_mm).min(safe_nm)])
+    }
+}
+
+/// Where the runs of the faces begin and end, in this order. A face that cannot be loaded has no part in it.
+///
+/// # Errors
+/// The part's file cannot be read.
+pub(super) fn stops<P: Sync>(
+    faces: &[P],
+    load: impl Fn(&P) -> Result<(Job, Prepared)> + Sync,
+) -> Result<Vec<Stop>> {
+    if faces.len() < 2 {
+        return Ok(vec![Stop::default(); faces.len()]);
+    }
+    let visit = |face: &P| load(face).map_or(Ok(None), Visit::new);
+    let visits: Vec<Option<Visit>> = faces.par_iter().map(visit).collect::<Result<_>>()?;
+    let between = visits.par_windows(2).map(|pair| match pair {
+        [Some(one), Some(next)] => one.stop_before(next).map(Some),
+        _ => Ok(None),
+    });
+    let between: Vec<Option<[i32; 3]>> = between.collect::<Result<_>>()?;
+    let before = std::iter::once(&None).chain(&between);
+    let behind = between.iter().chain([&None]);
+    let each = visits.iter().zip(before.zip(behind));
+    Ok(each
+        .map(|(visit, (home_nm, end))| Stop {
+            home_nm: *home_nm,
+            end_nm: match (visit, end) {
+                (_, Some(end)) => Some((*end, end[2])),
+                (Some(visit), None) if home_nm.is_some() => Some((visit.home_nm, visit.safe_nm)),
+                _ => None,
+            },
+        })
+        .collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::commands::home;
+    use interp_core::State;
+    use machine::Machine;
+    use std::path::{Path, PathBuf};
+
+    /// Three faces of the blade: each run begins where the one before ended, below the safe height, the last one comes home. A job that names its safe height has its runs begin
+    /// and end at home.
+    #[test]
+    fn a_run_begins_where_the_one_before_ended() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("blade.toml");
+        let blade = Path::new(env!("CARGO_MANIFEST_DIR")).join("../jobs/cad/blade.step");
+        let text = |machine: &str| {
+            format!(
+                "[part]\npath = {blade:?}\n[tool]\nkind = \"ball\"\nradius_mm = 3\n[cut]\nfeed_mm_min = 3000\nscallop_mm = 0.3\npattern = \"zigzag\"\nalong = \"u\"\n\
+                 side = \"up\"\n[machine]\nvelocity_max_mm_s = [100, 100, 50]\nhome_mm = [0, 0, 90]\n{machine}\n[[face]]\nface = 1\n[[face]]\nface = 7\n[[face]]\nface = 11\n"
+            )
+        };
+        let ends = |machine: &str| {
+            std::fs::write(&file, text(machine)).unwrap();
+            let faces = job_file::jobs_of(&file).unwrap();
+            let load = |path: &PathBuf| home::load(path, None, None, None);
+            let stops = stops(&faces, load).unwrap();
+            let run = |(face, stop): (&PathBuf, Stop)| {
+                let (mut job, mut prepared) = load(face).unwrap();
+                stop.apply(&mut job, &mut prepared);
+                let safe_nm = prepared.header.axes.unwrap().safe_z_nm;
+                let mut machine = Machine::load(&prepared).unwrap();
+                let mut samples = Vec::new();
+                machine
+                    .run(|sample| {
+                        samples.push((sample.cl_nm, sample.state));
+                        true
+                    })
+                    .unwrap();
+                assert_eq!(machine.state(), State::Finished);
+                (samples[0].0, samples.last().unwrap().0, safe_nm)
+            };
+            faces.iter().zip(stops).map(run).collect::<Vec<_>>()
+        };
+        let home_nm = [0, 0, 90_000_000];
+        let chained = ends("");
+        for pair in chained.windows(2) {
+            let distance = millimetres(pair[0].1).distance(millimetres(pair[1].0));
+            assert!(distance < 1e-3, "{distance} mm: {chained:?}");
+            assert!(pair[0].1[2] < pair[0].2, "{chained:?}");
+        }
+        assert_eq!((chained[0].0, chained[2].1), (home_nm, home_nm));
+        for (first, last, _) in ends("safe_z_mm = 130") {
+            assert_eq!((first, last), (home_nm, home_nm));
+        }
+    }
+}
