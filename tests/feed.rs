@@ -75,6 +75,7 @@ fn height(header: &Header, words: &[i32]) -> (i32, u32) {
         &Header {
             links: 0,
             window: 0,
+            strips: 0,
             axes: None,
             ..*header
         },

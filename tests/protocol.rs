@@ -42,6 +42,7 @@ fn header() -> Header {
         edges: 0,
         links: 0,
         window: 0,
+        strips: 0,
         axes: None,
     }
 }

@@ -163,7 +163,11 @@ fn region() {
 fn streamed_rows() {
     let streamed = job("streamed");
     assert!(streamed.header.window > 0);
-    compare_prepared(&[("torus", job("torus")), ("streamed", streamed)]);
+    compare_prepared(&[
+        ("torus", job("torus")),
+        ("streamed", streamed),
+        ("streamed_region", job("streamed_region")),
+    ]);
 }
 
 /// A job with axis limits, before and after one without.

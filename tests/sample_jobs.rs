@@ -71,6 +71,7 @@ jobs! {
     ruled_reconstructed: 132,
     sphere_cap: 85,
     streamed: 142,
+    streamed_region: 89,
     torus: 24,
 }
 

@@ -6,6 +6,7 @@ use interp_core::{
         Header,
         stream::{DIGEST_WORDS, head_words, row_words},
     },
+    region_checks,
 };
 use protocol::{digest::Digest, message::Reason};
 
@@ -29,6 +30,8 @@ struct Rows {
     head: u32,
     words: u32,
     patches: u32,
+    /// Records of the region, which come before the first row.
+    edges: u32,
     digest: Digest,
     /// The words of the digest that came so far.
     told: u64,
@@ -43,6 +46,7 @@ impl Rows {
             head: count(head_words(header)),
             words: count(row_words(header)),
             patches: header.path_spans.into(),
+            edges: region_checks(header),
             digest: Digest::new(),
             told: 0,
             checked: 0,
@@ -76,6 +80,13 @@ impl Rows {
                 wanted: self.told,
                 received: self.digest.value(),
             });
+        }
+        while self.checked < self.edges {
+            let record = self.checked;
+            machine
+                .load_check(record)
+                .map_err(|fault| refused(fault, Some(record)))?;
+            self.checked += 1;
         }
         for _ in 0..self.patches {
             let record = self.checked;

@@ -3,7 +3,7 @@
 use crate::command::{Command, Inputs};
 use crate::fault::{Fault, FaultKind, Result};
 use crate::job::program::Program;
-use crate::job::stream::RecordCopy;
+use crate::job::stream::{RecordCopy, RowsNeeded};
 use crate::job::{Header, STORE_WORDS};
 use crate::pass::patch::Patch;
 use crate::pass::position::PassPosition;
@@ -151,6 +151,12 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
     #[inline]
     pub const fn is_starved(&self) -> bool {
         self.motion.is_starved
+    }
+
+    /// The rows of a streamed job that the planning of the latest pass needed; none for the first pass, which may look at those of the window.
+    #[must_use]
+    pub const fn rows_needed(&self) -> Option<RowsNeeded> {
+        self.motion.program.asked()
     }
 
     /// Whether the loaded job can start: the first rows of a streamed job are no longer there once it has run.
@@ -474,11 +480,10 @@ impl Motion {
         } else {
             run.rows_needed(&job)
         };
-        let Some([first, last]) = rows else {
+        let Some(rows) = rows else {
             return Ok(false);
         };
-        program.release(first);
-        if !program.rows().has(last)? {
+        if !program.ask(store, &rows)? {
             self.is_starved = true;
         } else if has_limits {
             sequencer.set_has_rows();

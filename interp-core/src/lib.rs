@@ -85,7 +85,7 @@ pub use command::{Command, Inputs};
 pub use fault::{Fault, FaultKind};
 pub use interpolator::{Interpolator, SurfacePoint};
 pub use job::encode;
-pub use job::program::front_words;
+pub use job::program::{front_words, region_checks};
 pub use job::{AxisLimits, Header, Pattern, STORE_WORDS, Spacing, SurfaceKind, ToolSide};
 pub use math::number::NM_PER_MM;
 pub use sample::{RunStart, Sample, SpanParameter, State};

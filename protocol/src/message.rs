@@ -64,7 +64,7 @@
 //! | 38 | `StartJob` | name, 1 to go on where the last run of it was cut short | `Ack`: it is loaded, and starts as by `Start` |
 //!
 //! Header: kind, pattern, spacing, tool side (a byte each), spans along path and side (`u16`), ball radius (mm), feed (mm/s),
-//! scallop height (mm), period (s) (`f32`), window of a streamed job (rows, `u16`; 0 for another one); then 0, or 1 and the axes' limits: velocity (mm/s), acceleration (mm/s^2), jerk (mm/s^3)
+//! scallop height (mm), period (s) (`f32`), window of a streamed job (rows, `u16`; 0 for another one), number of its strips (`u16`); then 0, or 1 and the axes' limits: velocity (mm/s), acceleration (mm/s^2), jerk (mm/s^3)
 //! (three `f32` each), chord error (mm, `f32`), travel (least and most of each axis), home (nm, `i32`), plunge (mm, `f32`), safe height
 //! (nm, `i32`).
 //!

@@ -271,6 +271,7 @@ pub(crate) struct HeaderFields {
     edges: u16,
     links: u16,
     window: u16,
+    strips: u16,
     #[serde(with = "axes")]
     axes: Option<AxisLimits>,
 }

@@ -60,6 +60,7 @@ prop_compose! {
             edges: spans[0],
             links: spans[1],
             window: spans[0] ^ spans[1],
+            strips: spans[0].rotate_left(5),
             axes,
         }
     }

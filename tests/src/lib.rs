@@ -134,6 +134,7 @@ pub fn scaled_dome(scale: f64) -> (Header, Vec<i32>) {
         period_s: 0.001,
         links: 0,
         window: 0,
+        strips: 0,
         axes: None,
         ..Header::default()
     };

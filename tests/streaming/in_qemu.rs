@@ -4,6 +4,7 @@ use std::time::Instant;
 
 use interp_core::{Sample, State};
 use machine::Machine;
+use machine::links::Link;
 use machine::prepare::{Prepared, prepare};
 use machine::remote::operate::{Setup, make_ready};
 use machine::remote::qemu::Qemu;
@@ -12,7 +13,7 @@ use machine::remote::{Session, drive};
 use protocol::digest::Digest;
 use protocol::message::{Configuration, Report, Request};
 
-use super::{LIMITS, bumpy};
+use super::{LIMITS, bumpy, expected, regions};
 use crate::images;
 
 /// Digest of the run after each of its first passes, and its ticks up to there.
@@ -74,4 +75,37 @@ fn the_first_passes_of_a_hundred_rows() {
         session.command(&Request::Run { ticks: 1 }).unwrap();
         while !matches!(session.event().unwrap(), Event::Halted(_)) {}
     }
+}
+
+/// A region of 12 x 32 patches, more than the store holds, in cells and with links: the whole run.
+#[test]
+fn a_region_of_more_patches_than_the_store() {
+    let mut job = prepare(&regions::in_cells(4, [12, 32], regions::with_hole(2.0))).unwrap();
+    assert!(job.patches() > 309 && job.header.window >= 3 && job.header.strips > 1);
+    let links: Vec<Link> = (machine::links::between(&machine::links::passes(&job))
+        .iter()
+        .zip(0..))
+    .map(|([from, to], index)| match index % 2 {
+        0 => Link::Straight,
+        _ => Link::Across(from[2].max(to[2]) + 300_000),
+    })
+    .collect();
+    machine::links::add(&mut job, &links);
+    let wanted = expected(&job);
+    println!(
+        "{} passes, {} strips, {} words, window {}",
+        wanted.len(),
+        job.header.strips,
+        job.words.len(),
+        job.header.window
+    );
+    let (_qemu, stream) = Qemu::start(images::for_qemu()).unwrap();
+    let mut session = Session::open(stream, 1).unwrap();
+    make_ready(&mut session, &Setup::simulated(Configuration::DEFAULT)).unwrap();
+    drive::upload(&mut session, &job, |_| {}).unwrap();
+    let ran = drive::run_digests(&mut session, &wanted, true, None, |_| {}).unwrap();
+    assert_eq!(ran.status.state, State::Finished, "{:?}", ran.status);
+    assert_eq!(ran.first_bad_pass, None, "{ran:?}");
+    assert_eq!(Some(ran.status.digest), wanted.last().map(|pass| pass.digest));
+    assert_eq!(ran.status.stream.received as usize, job.words.len());
 }

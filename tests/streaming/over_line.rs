@@ -7,13 +7,14 @@ use std::sync::{Arc, Mutex};
 use controller::in_process::Board;
 use interp_core::State;
 use interp_core::job::stream::{head_words, row_words};
+use machine::links::Link;
 use machine::prepare::{Prepared, prepare, streamed};
 use machine::remote::operate::{Setup, make_ready};
 use machine::remote::session::{Event, Stream};
 use machine::remote::{RemoteError, Session, drive};
 use protocol::message::{Configuration, Reason, Request, Status};
 
-use super::{CUTS, bumpy, expected};
+use super::{CUTS, bumpy, expected, regions};
 
 /// Words of the board's store: room for five rows of the test's jobs.
 const WORDS: usize = 1800;
@@ -94,6 +95,23 @@ impl Bench {
     fn new((cut, machine): (&str, &str)) -> Self {
         let job = streamed(&prepare(&bumpy([6, 12], [2.5, 2.0], cut, machine)).unwrap(), 3);
         assert!(head_words(&job.header) + 5 * row_words(&job.header) <= WORDS);
+        Self::of(job)
+    }
+
+    /// A region in cells, with links.
+    fn of_region() -> Self {
+        let mut job = prepare(&regions::in_cells(4, [3, 24], regions::with_hole(0.6))).unwrap();
+        let links: Vec<Link> = (machine::links::between(&machine::links::passes(&job)).iter())
+            .map(|[from, to]| Link::Across(from[2].max(to[2]) + 300_000))
+            .collect();
+        machine::links::add(&mut job, &links);
+        let job = streamed(&job, 3);
+        assert!(job.header.strips > 1 && job.header.links > 10);
+        Self::of(job)
+    }
+
+    fn of(job: Prepared) -> Self {
+        assert!(head_words(&job.header) + job.least_rows * row_words(&job.header) <= WORDS);
         assert!(job.words.len() > 2 * WORDS);
         Self {
             job,
@@ -133,18 +151,23 @@ impl Bench {
 /// On a free clock and in lockstep; with a host that is awake, and one that sleeps so long before each chunk that the run waits for every row.
 #[test]
 fn a_board_runs_a_job_that_is_larger_than_its_store() {
-    for cut in [CUTS[0], CUTS[3], CUTS[4]] {
+    let benches: [fn() -> Bench; 4] = [
+        || Bench::new(CUTS[0]),
+        || Bench::new(CUTS[3]),
+        || Bench::new(CUTS[4]),
+        Bench::of_region,
+    ];
+    for new in benches {
         for lockstep in [false, true] {
-            let bench = Bench::new(cut);
+            let bench = new();
             let status = bench.run(GOOD, lockstep);
             assert_eq!(status.stream.received as usize, bench.job.words.len());
             let sleeps = Line {
                 ticks_a_write: 4000,
                 ..GOOD
             };
-            let bench = Bench::new(cut);
-            let status = bench.run(sleeps, lockstep);
-            assert!(status.stream.starved > 1000, "{cut:?}: {:?}", status.stream);
+            let status = new().run(sleeps, lockstep);
+            assert!(status.stream.starved > 1000, "{:?}", status.stream);
         }
     }
 }
@@ -172,20 +195,22 @@ fn a_second_run_begins_with_an_upload() {
 /// One byte in a hundred is dropped, both ways.
 #[test]
 fn dropped_bytes_change_nothing() {
-    let bench = Bench::new(CUTS[4]);
     let line = Line {
         drops_one_in: 100,
         ..GOOD
     };
-    let status = bench.run(line, true);
-    assert!(status.frames_bad > 100, "{}", status.frames_bad);
+    for bench in [Bench::new(CUTS[4]), Bench::of_region()] {
+        let status = bench.run(line, true);
+        assert!(status.frames_bad > 100, "{}", status.frames_bad);
+    }
 }
 
 /// The host goes away in the middle of the run, which then waits; another one goes on where the board received the last word.
 #[test]
 fn another_host_goes_on_with_the_stream() {
-    for away_after in [1, 3, 6] {
-        let bench = Bench::new(CUTS[4]);
+    let plain = [1, 3, 6].map(|away_after| (away_after, Bench::new(CUTS[4])));
+    let of_region = [1, 9, 20, 31].map(|away_after| (away_after, Bench::of_region()));
+    for (away_after, bench) in plain.into_iter().chain(of_region) {
         let wanted = expected(&bench.job);
         let mut session = bench.loaded(GOOD);
         session.command(&Request::Start).unwrap();

@@ -53,7 +53,7 @@ fn words(kind: FaultKind) -> [&'static str; 5] {
         FaultKind::TooManyPatches => [
             "The surface data of the job exceed the machine's store, or of a streamed job the rows that have to be there at once.",
             "The 32-bit words of the job, or of these rows.",
-            "Each span between knots, in u and in v, becomes a patch of 52 words, or 68 if it is rational. More than 309 (237 rational) are streamed, which takes room for three rows.",
+            "Each span between knots, in u and in v, becomes a patch of 52 words, or 68 if it is rational. More than 309 (237 rational) are streamed, which takes room for three rows, with a region for up to six, beside its words and those of the links.",
             "Use fewer knots, give the other direction with `along`, or cut the part into several jobs.",
             "A surface of 150 x 150 bicubic patches: three rows of 150 are 450 patches, where about 309 fit.",
         ],

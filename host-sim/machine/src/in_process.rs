@@ -1,5 +1,6 @@
 //! The machine in this process: the core with a job loaded, a tick and the planning of the period in one call.
 
+use interp_core::job::stream::RowsNeeded;
 use interp_core::steps::BUFFER_WORDS;
 use interp_core::{
     Command, Fault, Inputs, Interpolator, RunStart, STORE_WORDS, Sample, SpanParameter, State, Steps,
@@ -82,6 +83,25 @@ impl Machine {
             }
         }
         self.core.fault().map_or(Ok(()), Err)
+    }
+
+    /// Runs a streamed job to its end or a fault: the rows that each pass behind the first one needs.
+    pub(crate) fn rows_needed(&mut self) -> Vec<RowsNeeded> {
+        let mut needed = Vec::new();
+        let mut command = Some(Command::Start);
+        let mut last = None;
+        loop {
+            let sample = *self.tick(command.take());
+            if !matches!(sample.state, State::Running | State::Linking) {
+                return needed;
+            }
+            // Those that need the same rows as the pass before them are not listed again.
+            let asked = self.core.rows_needed();
+            if asked != last {
+                needed.extend(asked);
+                last = asked;
+            }
+        }
     }
 
     /// Executes one period: the tick, then the planning.

@@ -6,7 +6,7 @@ use interp_core::job::links::{Detour, LINK_HEIGHT_MIN, LINK_STRAIGHT};
 use interp_core::{STORE_WORDS, State};
 
 use crate::Machine;
-use crate::prepare::Prepared;
+use crate::prepare::{Prepared, stream};
 
 /// How a link goes to its pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,16 +53,35 @@ pub fn between<T: Copy>(passes: &[[T; 2]]) -> Vec<[T; 2]> {
 
 /// Gives a job the words of its links, the first one that to the second pass: as many as fit into the board's store; the others go at the safe height.
 pub fn add(prepared: &mut Prepared, links: &[Link]) {
-    let room = STORE_WORDS.saturating_sub(prepared.words.len()).min(links.len());
-    let Ok(count) = u16::try_from(room) else {
+    let is_streamed = prepared.header.window > 0;
+    let spare = if is_streamed {
+        stream::spare_words(prepared)
+    } else {
+        STORE_WORDS.saturating_sub(prepared.words.len())
+    };
+    let words = links.iter().take(spare).map(|link| match link {
+        Link::Straight => LINK_STRAIGHT,
+        Link::Around(detour) => detour.to_word(),
+        Link::Across(height_nm) => (*height_nm).max(LINK_HEIGHT_MIN),
+    });
+    let words: Vec<i32> = words.collect();
+    let Ok(count) = u16::try_from(words.len()) else {
         return;
     };
+    set(prepared, &words, count);
+}
+
+/// Takes the words of its links from a job, which then goes at the safe height.
+pub fn remove(prepared: &mut Prepared) {
+    set(prepared, &[], 0);
+}
+
+fn set(prepared: &mut Prepared, words: &[i32], count: u16) {
+    if prepared.header.window > 0 {
+        return stream::set_links(prepared, words, count);
+    }
+    let behind = prepared.words.len() - usize::from(prepared.header.links);
+    prepared.words.truncate(behind);
+    prepared.words.extend(words);
     prepared.header.links = count;
-    prepared
-        .words
-        .extend(links.iter().take(room).map(|link| match link {
-            Link::Straight => LINK_STRAIGHT,
-            Link::Around(detour) => detour.to_word(),
-            Link::Across(height_nm) => (*height_nm).max(LINK_HEIGHT_MIN),
-        }));
 }

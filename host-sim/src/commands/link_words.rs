@@ -31,8 +31,7 @@ pub(super) fn passes(job: &Job, prepared: &Prepared) -> Result<Vec<[[i32; 3]; 2]
     if let Some(axes) = &mut bare.header.axes {
         (axes.home_nm, axes.end_nm) = ([0, 0, axes.safe_z_nm], None);
     }
-    let links = usize::from(std::mem::take(&mut bare.header.links));
-    bare.words.truncate(bare.words.len() - links);
+    links::remove(&mut bare);
     let key = format!("{:?} {:?}", bare.header, bare.words);
     part::passes(job, key.as_bytes(), || links::passes(&bare))
         .map_err(|error| Failure::input(error.what, error.remedy))

@@ -10,8 +10,11 @@
 //! | with a region | its cells and edges: [`region`] |
 //! | [`Header::links`] | for each pass from the second one on: how the tool goes to it, [`links`] |
 //!
+//! Those of a job that is loaded while it runs have another order: [`stream`].
+//!
 //! The records are described in the files of [`crate::surface`].
 
+mod check;
 pub mod encode;
 pub mod links;
 pub(crate) mod program;
@@ -197,10 +200,12 @@ pub struct Header {
     pub period_s: f32,
     /// Records of the region that is machined, in the words behind the patches: [`region`]; 0 for the whole surface. None with passes of constant scallop height.
     pub edges: u16,
-    /// Words of links, the last ones of the job: passes behind them are reached at the safe height. Only with axis limits, straight passes, and all of the job stored.
+    /// Words of links: passes behind them are reached at the safe height. Only with axis limits and straight passes.
     pub links: u16,
     /// Rows of patches that a pass and what is planned on it may use, for a job that is loaded while it runs: [`stream`]. 0 for one that is stored as a whole.
     pub window: u16,
+    /// Strips of rows in which a streamed job with a region comes; 0 for any other one.
+    pub strips: u16,
     /// Axis limits; none for a constant feed.
     pub axes: Option<AxisLimits>,
 }

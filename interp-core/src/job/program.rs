@@ -1,17 +1,12 @@
 //! The job store: accepts words in order, and releases the job only when it is complete and checked.
 
-use crate::command::OVERRIDE_MAX;
 use crate::fault::{Fault, FaultKind, Result};
+use crate::job::check::check_header;
 use crate::job::links::Link;
-use crate::job::region::{
-    EDGE_WORDS, EDGES_A_RECORD, FirstLine, REGION_SPANS_MAX, RegionCheck, RegionWords, ScanLine,
-};
+use crate::job::region::{EDGE_WORDS, EDGES_A_RECORD, FirstLine, RegionCheck, RegionWords, ScanLine};
 use crate::job::stations::{SPANS_MAX as FRONT_SPANS_MAX, Stations};
-use crate::job::stream::{DIGEST_WORDS, RecordCopy, Rows, WINDOW_MIN};
-use crate::job::{
-    AxisLimits, CELLS_MAX, Header, OVERRUN_MAX_MM, SPANS_MAX, STEP_MAX_MM, SurfaceKind, width_words,
-};
-use crate::math::number::nm_to_mm;
+use crate::job::stream::{RecordCopy, Rows, RowsNeeded};
+use crate::job::{AxisLimits, Header, SurfaceKind, width_words};
 use crate::surface::{
     POLYNOMIAL_WORDS, PolynomialRecord, RATIONAL_WORDS, REVOLVED_WORDS, RationalRecord, RevolvedRecord,
     split_patch,
@@ -50,28 +45,28 @@ pub(crate) const fn record_words(kind: SurfaceKind) -> usize {
     }
 }
 
-/// Patches of a header, and words that it implies.
+/// Patches of a header, and words that it implies for a job that is stored as a whole.
 pub(crate) fn extent(header: &Header) -> (u32, u64) {
     let patches = u32::from(header.path_spans) * u32::from(header.side_spans);
     let words = u64::from(patches) * record_words(header.kind) as u64;
-    let digests = if header.window > 0 {
-        DIGEST_WORDS as u64 * u64::from(header.side_spans)
-    } else {
-        0
-    };
-    let words = words + digests;
-    (
-        patches,
-        words
-            + u64::from(width_words(header.path_spans, header.side_spans))
-            + region_words(header) as u64
-            + u64::from(header.links),
-    )
+    let widths = width_words(header.path_spans, header.side_spans);
+    (patches, words + u64::from(widths) + tail_words(header) as u64)
+}
+
+/// Words of a header's region and its links.
+pub(crate) const fn tail_words(header: &Header) -> usize {
+    region_words(header) + header.links as usize
 }
 
 /// Words of a header's region.
 const fn region_words(header: &Header) -> usize {
     EDGE_WORDS * header.edges as usize
+}
+
+/// Records of the checks of a region at load.
+#[must_use]
+pub fn region_checks(header: &Header) -> u32 {
+    u32::from(header.edges).div_ceil(EDGES_A_RECORD)
 }
 
 /// Words of the store that a job takes behind its data, for the stations of passes of constant scallop height; none where it crosses more patches than there
@@ -82,110 +77,6 @@ pub fn front_words(header: &Header) -> Option<usize> {
         return Some(0);
     }
     (header.path_spans <= FRONT_SPANS_MAX).then(|| Stations::most(header.path_spans).words())
-}
-
-fn check_header(header: &Header) -> Result<()> {
-    let spans_max = match header.kind {
-        SurfaceKind::Polynomial | SurfaceKind::Rational => SPANS_MAX,
-        SurfaceKind::RevolvedAlongProfile | SurfaceKind::RevolvedAroundAxis => 1,
-    };
-    for spans in [header.path_spans, header.side_spans] {
-        if !(1..=spans_max).contains(&spans) {
-            return Err(Fault::new(FaultKind::BadHeader, f32::from(spans)));
-        }
-    }
-    let spans = header.path_spans.max(header.side_spans);
-    if header.edges > 0 && (header.spacing.is_constant() || spans > REGION_SPANS_MAX) {
-        return Err(Fault::new(FaultKind::BadHeader, f32::from(header.edges)));
-    }
-    if header.links > 0 && (header.spacing.is_constant() || header.axes.is_none()) {
-        return Err(Fault::new(FaultKind::BadHeader, f32::from(header.links)));
-    }
-    if front_words(header).is_none() {
-        return Err(Fault::new(FaultKind::BadHeader, f32::from(header.path_spans)));
-    }
-    if header.window > 0 {
-        check_streamed(header)?;
-    }
-    let ranges = [
-        (header.ball_radius_mm, f32::MIN_POSITIVE, 1000.0),
-        (header.feed_mm_s, 1e-3, 10_000.0),
-        (header.scallop_mm, f32::MIN_POSITIVE, header.ball_radius_mm),
-        (header.period_s, 1e-5, 0.1),
-    ];
-    for (value, least, most) in ranges {
-        // Positive comparisons, so that a NaN is rejected.
-        if !(value >= least && value <= most) {
-            return Err(Fault::new(FaultKind::BadHeader, value));
-        }
-    }
-    header
-        .axes
-        .as_ref()
-        .map_or(Ok(()), |axes| check_axes(header, axes))
-}
-
-/// A job that is loaded while it runs: straight passes over a grid, without turns, because the tool has to be able to wait at the end of each pass.
-fn check_streamed(header: &Header) -> Result<()> {
-    let is_grid = matches!(header.kind, SurfaceKind::Polynomial | SurfaceKind::Rational);
-    let turns = header.axes.is_some_and(|axes| axes.overrun_mm > 0.0);
-    if !is_grid
-        || header.edges > 0
-        || header.links > 0
-        || header.spacing.is_constant()
-        || turns
-        || header.window < WINDOW_MIN
-    {
-        return Err(Fault::new(FaultKind::BadHeader, f32::from(header.window)));
-    }
-    Ok(())
-}
-
-/// Ranges of the axis limits, within which the step of a period fits its integer and no product of the planner overflows.
-fn check_axes(header: &Header, axes: &AxisLimits) -> Result<()> {
-    let bad = |value| Err(Fault::new(FaultKind::BadHeader, value));
-    let all = [
-        (axes.velocity_mm_s, 1e-3, 1e5),
-        (axes.acceleration_mm_s2, 1e-2, 1e7),
-        (axes.jerk_mm_s3, 1e-1, 1e9),
-        ([axes.chord_mm; 3], 1e-6, 1e3),
-    ];
-    for (values, least, most) in all {
-        for value in values {
-            if !(value >= least && value <= most) {
-                return bad(value);
-            }
-        }
-    }
-    if !(axes.plunge_mm >= 0.0 && axes.plunge_mm <= 1e3) {
-        return bad(axes.plunge_mm);
-    }
-    if !(axes.overrun_mm >= 0.0 && axes.overrun_mm <= OVERRUN_MAX_MM) {
-        return bad(axes.overrun_mm);
-    }
-    // The feed at the maximum override has to fit the step of a period.
-    if OVERRIDE_MAX * header.feed_mm_s * header.period_s > STEP_MAX_MM {
-        return bad(header.feed_mm_s);
-    }
-    if usize::from(header.path_spans) > CELLS_MAX {
-        return bad(f32::from(header.path_spans));
-    }
-    let [x, y, _] = axes.home_nm;
-    let end_nm = axes.end_nm.unwrap_or(axes.home_nm);
-    let end_height_nm = axes.end_nm.map_or(axes.safe_z_nm, |_| axes.end_height_nm);
-    for place in [
-        axes.home_nm,
-        end_nm,
-        [x, y, axes.safe_z_nm],
-        [x, y, end_height_nm],
-    ] {
-        for (place, [least, most]) in place.into_iter().zip(axes.travel_nm) {
-            if !(least..=most).contains(&place) {
-                return bad(nm_to_mm(place));
-            }
-        }
-    }
-    Ok(())
 }
 
 impl Program {
@@ -204,6 +95,7 @@ impl Program {
             edges: 0,
             links: 0,
             window: 0,
+            strips: 0,
             axes: None,
         };
         Self {
@@ -217,18 +109,18 @@ impl Program {
 
     pub(crate) fn begin(&mut self, header: &Header, words: u32, capacity: usize) -> Result<()> {
         check_header(header)?;
-        let (_, needed) = extent(header);
-        let rows = Rows::new(header, capacity);
-        let stored = if header.window > 0 {
-            rows.least_words()
+        let rows = Rows::new(header, words, capacity);
+        let (needed, stored) = if header.window > 0 {
+            (rows.words(), rows.least_words())
         } else {
-            needed + front_words(header).unwrap_or(0) as u64
+            let (_, needed) = extent(header);
+            (needed, needed + front_words(header).unwrap_or(0) as u64)
         };
         if stored > capacity as u64 {
             #[allow(clippy::cast_precision_loss, reason = "a report; at most 2^27")]
             return Err(Fault::new(FaultKind::TooManyPatches, stored as f32));
         }
-        if u64::from(words) != needed {
+        if u64::from(words) != needed || rows.count() == 0 {
             return Err(bad_length(words));
         }
         self.stage = LoadStage::Loading {
@@ -247,11 +139,6 @@ impl Program {
         self.header.window > 0
     }
 
-    /// The rows of the job in the store.
-    pub(crate) const fn rows(&self) -> &Rows {
-        &self.rows
-    }
-
     /// Words that have been received, and up to which the store has room now.
     pub(crate) fn room(&self) -> [u32; 2] {
         match self.stage {
@@ -263,8 +150,21 @@ impl Program {
     }
 
     /// The run is on a pass in this row: those before it may be overwritten.
-    pub(crate) const fn release(&mut self, row: u16) {
+    pub(crate) fn release(&mut self, row: u16) {
         self.rows.release(row);
+    }
+
+    /// Whether the rows are there that the planning of a pass needs; see [`Rows::ask`].
+    ///
+    /// # Errors
+    /// As there.
+    pub(crate) fn ask(&mut self, store: &[i32], needed: &RowsNeeded) -> Result<bool> {
+        self.rows.ask(store, needed)
+    }
+
+    /// See [`Rows::asked`].
+    pub(crate) const fn asked(&self) -> Option<RowsNeeded> {
+        self.rows.asked()
     }
 
     /// The run begins anew.
@@ -276,7 +176,7 @@ impl Program {
     }
 
     /// Whether [`Self::rewind`] would succeed.
-    pub(crate) fn can_rewind(&self) -> bool {
+    pub(crate) const fn can_rewind(&self) -> bool {
         self.rows.can_rewind()
     }
 
@@ -311,13 +211,22 @@ impl Program {
         Ok(())
     }
 
-    /// Records: patches, then portions of edges.
+    /// Records: patches and portions of edges, which come in the order of their words.
     pub(crate) fn records(&self) -> u32 {
-        self.patches() + u32::from(self.header.edges).div_ceil(EDGES_A_RECORD)
+        self.patches() + region_checks(&self.header)
     }
 
     fn patches(&self) -> u32 {
-        extent(&self.header).0
+        self.rows.count().saturating_mul(self.header.path_spans.into())
+    }
+
+    /// The first patch and the first portion of edges among the records.
+    fn firsts(&self) -> [u32; 2] {
+        if self.is_streamed() {
+            [region_checks(&self.header), 0]
+        } else {
+            [0, self.patches()]
+        }
     }
 
     /// Copies a record of a streamed job, to be checked.
@@ -325,33 +234,43 @@ impl Program {
     /// # Errors
     /// [`FaultKind::BadLength`] where it is not the next one, or not there yet.
     pub(crate) fn copy(&self, store: &[i32], record: u32) -> Result<RecordCopy> {
-        let is_there = self.is_streamed() && self.stage != LoadStage::Empty && self.rows.is_next(record);
+        let patch = self.patch_of(record).filter(|patch| self.rows.is_next(*patch));
+        let Some(patch) = patch.filter(|_| self.is_streamed() && self.stage != LoadStage::Empty) else {
+            return Err(bad_length(record));
+        };
         let job = self.view(store);
         let spans = usize::from(self.header.path_spans.max(1));
-        let (index, first) = (record as usize, record as usize - record as usize % spans);
+        let (index, first) = (patch as usize, patch as usize - patch as usize % spans);
         let words = |index| match self.header.kind {
             SurfaceKind::Polynomial => job.record::<POLYNOMIAL_WORDS>(index).map(<[i32; _]>::as_slice),
             SurfaceKind::Rational => job.record::<RATIONAL_WORDS>(index).map(<[i32; _]>::as_slice),
             SurfaceKind::RevolvedAlongProfile | SurfaceKind::RevolvedAroundAxis => None,
         };
         match (words(index), words(first)) {
-            (Some(words), Some(first)) if is_there => Ok(RecordCopy::new(record, words, first)),
+            (Some(words), Some(first)) => Ok(RecordCopy::new(record, words, first)),
             _ => Err(bad_length(record)),
         }
+    }
+
+    /// The patch of a record, if it is one.
+    fn patch_of(&self, record: u32) -> Option<u32> {
+        let [first, _] = self.firsts();
+        record.checked_sub(first).filter(|patch| *patch < self.patches())
     }
 
     /// Seals a record of a streamed job whose copy is sound.
     ///
     /// # Errors
-    /// As [`Self::copy`]; [`FaultKind::BadHeader`] for a width of a span, with the first record.
+    /// As [`Self::copy`]; [`FaultKind::BadHeader`] for a width of a span or a strip, with the first record.
     pub(crate) fn accept(&mut self, store: &[i32], record: u32) -> Result<()> {
-        if record == 0 {
+        let patch = self.patch_of(record);
+        if patch == Some(0) {
             self.view(store).check_widths()?;
+            self.rows.check_strips(store, self.header.side_spans)?;
         }
-        if self.rows.accept(record) {
-            Ok(())
-        } else {
-            Err(bad_length(record))
+        match patch {
+            Some(patch) if self.rows.accept(patch) => Ok(()),
+            _ => Err(bad_length(record)),
         }
     }
 
@@ -377,41 +296,45 @@ impl Program {
 
     /// Checks a record. `line`: one that is free while a job is loaded.
     pub(crate) fn check(&mut self, store: &[i32], record: u32, line: &mut ScanLine) -> Result<()> {
-        if self.is_streamed() {
-            self.copy(store, record)?.check()?;
-            return self.accept(store, record);
-        }
         let LoadStage::Loading { received, checked } = self.stage else {
-            return Err(bad_length(0));
+            return self.check_streamed(store, record);
         };
-        if received != self.length || record > checked || record >= self.records() {
+        if self.patch_of(record).is_some() && self.is_streamed() {
+            return self.check_streamed(store, record);
+        }
+        let is_there = if self.is_streamed() {
+            self.rows.has_head()
+        } else {
+            received == self.length
+        };
+        if !is_there || record > checked || record >= self.records() {
             return Err(bad_length(received));
         }
-        let job = Job {
-            header: &self.header,
-            store,
-            length: self.length as usize,
-            rows: &self.rows,
+        let is_sound = match self.patch_of(record) {
+            Some(patch) => self.check_patch(store, patch)?,
+            // Once each, in order: the first line is found on the way.
+            None => record < checked || self.check_edges(store, record, line),
         };
-        if record == 0 {
+        self.stage = LoadStage::Loading {
+            received,
+            checked: if is_sound { checked.max(record + 1) } else { 0 },
+        };
+        if is_sound { Ok(()) } else { Err(bad_patch(record)) }
+    }
+
+    /// A patch of a streamed job.
+    fn check_streamed(&mut self, store: &[i32], record: u32) -> Result<()> {
+        self.copy(store, record)?.check()?;
+        self.accept(store, record)
+    }
+
+    /// Whether a patch of a job that is stored as a whole is sound.
+    fn check_patch(&self, store: &[i32], patch: u32) -> Result<bool> {
+        let job = self.view(store);
+        if patch == 0 {
             job.check_widths()?;
         }
-        if let Some(portion) = record.checked_sub(self.patches()) {
-            // Once each, in order: the first line is found on the way.
-            let is_sound = record < checked
-                || job.region().is_some_and(|region| {
-                    if portion == 0 {
-                        self.region.begin();
-                    }
-                    self.region.check(&self.header, &region, portion, line)
-                });
-            self.stage = LoadStage::Loading {
-                received,
-                checked: if is_sound { checked.max(record + 1) } else { 0 },
-            };
-            return if is_sound { Ok(()) } else { Err(bad_patch(record)) };
-        }
-        let index = record as usize;
+        let index = patch as usize;
         let result = match self.header.kind {
             SurfaceKind::Polynomial => job.record(index).map(PolynomialRecord::check),
             SurfaceKind::Rational => job.record(index).map(RationalRecord::check),
@@ -419,23 +342,30 @@ impl Program {
                 job.record(index).map(RevolvedRecord::check)
             }
         };
-        match result {
-            Some(Ok(())) if !job.is_alike(index) => Err(bad_patch(record)),
-            Some(Ok(())) => {
-                self.stage = LoadStage::Loading {
-                    received,
-                    checked: checked.max(record + 1),
-                };
-                Ok(())
-            }
-            _ => Err(bad_patch(record)),
+        Ok(matches!(result, Some(Ok(()))) && job.is_alike(index))
+    }
+
+    /// Whether a portion of edges is sound.
+    fn check_edges(&mut self, store: &[i32], record: u32, line: &mut ScanLine) -> bool {
+        let [_, first] = self.firsts();
+        let portion = record.saturating_sub(first);
+        if portion == 0 {
+            self.region.begin();
         }
+        let job = Job {
+            header: &self.header,
+            store,
+            length: self.length as usize,
+            rows: &self.rows,
+        };
+        job.region()
+            .is_some_and(|region| self.region.check(&self.header, &region, portion, line))
     }
 
     pub(crate) fn seal(&mut self) -> Result<()> {
         match self.stage {
-            LoadStage::Loading { .. } if self.is_streamed() => {
-                if !self.rows.can_begin() {
+            LoadStage::Loading { checked, .. } if self.is_streamed() => {
+                if checked < region_checks(&self.header) || !self.rows.can_begin() {
                     return Err(bad_length(self.rows.received()));
                 }
                 self.stage = LoadStage::Sealed;
@@ -502,9 +432,19 @@ impl<'a> Job<'a> {
         if self.header.edges == 0 {
             return None;
         }
-        let end = self.length.checked_sub(self.header.links.into())?;
-        let from = end.checked_sub(region_words(self.header))?;
-        Some(RegionWords::new(self.store.get(from..end)?))
+        let words = self.store.get(self.tail()..)?;
+        Some(RegionWords::new(words.get(..region_words(self.header))?))
+    }
+
+    /// The first word of the region: before the rows of a streamed job, behind those of one that is stored as a whole.
+    fn tail(&self) -> usize {
+        let (patches, _) = extent(self.header);
+        let widths = width_words(self.header.path_spans, self.header.side_spans) as usize;
+        if self.header.window > 0 {
+            widths
+        } else {
+            widths + patches as usize * record_words(self.header.kind)
+        }
     }
 
     /// How the tool goes to a pass that is not joined to the one before it on the surface.
@@ -514,8 +454,8 @@ impl<'a> Job<'a> {
             .checked_sub(1)
             .filter(|index| *index < links)
             .and_then(|index| {
-                let behind = usize::try_from(links - index).ok()?;
-                self.store.get(self.length.checked_sub(behind)?).copied()
+                let first = self.tail() + region_words(self.header);
+                self.store.get(first + index as usize).copied()
             });
         Link::from_word(word.unwrap_or(axes.safe_z_nm), axes)
     }
@@ -535,7 +475,7 @@ impl<'a> Job<'a> {
     fn record<const N: usize>(&self, index: usize) -> Option<&'a [i32; N]> {
         let spans = usize::from(self.header.path_spans);
         let (row, within) = (index.checked_div(spans)?, index.checked_rem(spans)?);
-        let start = self.rows.start(row)? + within * N;
+        let start = self.rows.start_of(u32::try_from(row).ok()?)? + within * N;
         self.store.get(start..)?.first_chunk::<N>()
     }
 
@@ -544,7 +484,7 @@ impl<'a> Job<'a> {
     /// # Errors
     /// [`FaultKind::WrongState`] where the job has no such patch.
     pub(crate) fn patch<const N: usize>(&self, path_span: u16, side_span: u16) -> Result<&'a [i32; N]> {
-        let start = self.rows.start(side_span.into());
+        let start = self.rows.start(side_span);
         start
             .and_then(|start| {
                 self.store

@@ -9,6 +9,7 @@ use crate::job::program::Job;
 use crate::job::region::{CellWords, FirstLine, ScanLine, end_of, place_from, place_of, place_to};
 use crate::job::{Header, Pattern};
 use crate::pass::route::Route;
+use crate::pass::row_history::RowHistory;
 use crate::pass::schedule;
 use crate::sample::SpanParameter;
 
@@ -94,6 +95,11 @@ impl RegionLines {
         self.is_in_use && !self.is_seeking && self.done < self.line.intervals()
     }
 
+    /// Side parameter of the next pass on this line, if there is another one.
+    pub(crate) fn next_side(&self, header: &Header) -> Option<SpanParameter> {
+        self.has_more().then(|| side_at(header, self.line.side()))
+    }
+
     /// The next pass on this line.
     pub(crate) fn take(&mut self, header: &Header) -> Option<Route> {
         if !self.has_more() {
@@ -119,8 +125,10 @@ impl RegionLines {
         })
     }
 
-    /// Whether the tool may go on the surface, along the boundary, from the end of a pass to the start of this one, which is the first on its line.
-    pub(crate) fn joins(&self, header: &Header, from: &Route, to: &Route) -> bool {
+    /// Whether the tool may go on the surface, along the boundary, from the end of a pass to the start of this one, which is the first on its line. `rows`: those of
+    /// the passes up to the first of them.
+    pub(crate) fn joins(&self, header: &Header, from: &Route, to: &Route, rows: Option<&RowHistory>) -> bool {
+        let is_near = rows.is_none_or(|rows| header.window == 0 || !rows.jumps(header, to.side.span));
         let ([_, end], [start, _]) = (from.ends, to.ends);
         let [near, far] = self.line.joins();
         let is_boundary = if from.reversed {
@@ -128,21 +136,21 @@ impl RegionLines {
         } else {
             far && place_of(start) == end_of(header.path_spans)
         };
-        self.done == 1 && is_boundary && start == end && from.reversed != to.reversed
+        is_near && self.done == 1 && is_boundary && start == end && from.reversed != to.reversed
     }
 
-    /// Goes on to the next line after a step-over; false after the last line.
+    /// Goes on to the next line after a step-over; false after the last line. `rows`: those of the last passes.
     ///
     /// # Errors
     /// [`FaultKind::IntervalTooSmall`] where the step does not advance the line.
-    pub(crate) fn go_on(&mut self, job: &Job<'_>, step: f32) -> Result<bool> {
+    pub(crate) fn go_on(&mut self, job: &Job<'_>, step: f32, rows: Option<&RowHistory>) -> Result<bool> {
         self.step = step;
         self.is_seeking = true;
-        self.next_line(job, false)
+        self.next_line(job, rows)
     }
 
-    /// Moves the line by the step, or to the next cell; false after the last line of the last one.
-    fn next_line(&mut self, job: &Job<'_>, skips: bool) -> Result<bool> {
+    /// Moves the line by the step, or to the next cell; false after the last line of the last one. `rows`: those of the last passes, where there was one on the line.
+    fn next_line(&mut self, job: &Job<'_>, rows: Option<&RowHistory>) -> Result<bool> {
         let Some(cell) = self.cell(job) else {
             return Ok(false);
         };
@@ -154,14 +162,21 @@ impl RegionLines {
             Some(next) => next.max(side + 1),
             None => {
                 let width = |span| job.side_width(span);
-                let at = schedule::next_side(place_from(side), self.step, job.header.side_spans, width)?;
-                place_of(at)
+                let from = place_from(side);
+                let at = match rows {
+                    Some(rows) => rows.next_side(job.header, from, self.step, width),
+                    None => schedule::next_side(from, self.step, job.header.side_spans, width),
+                };
+                let at = at?;
+                // At the end of the window the line stays in its last row.
+                let is_within = at.fraction == u64::MAX && at.span + 1 < job.header.side_spans;
+                place_of(at) - i32::from(is_within)
             }
         };
         if next <= side {
             return Err(Fault::new(FaultKind::IntervalTooSmall, self.step));
         }
-        self.line.go_on(next.min(cell.last()), skips);
+        self.line.go_on(next.min(cell.last()), rows.is_none());
         Ok(true)
     }
 
@@ -200,7 +215,7 @@ impl RegionLines {
             return Ok(NextPass::Sought);
         }
         if self.line.intervals() == 0 {
-            return Ok(if self.next_line(job, true)? {
+            return Ok(if self.next_line(job, None)? {
                 NextPass::Sought
             } else {
                 self.is_seeking = false;

@@ -1,6 +1,7 @@
 //! Rows of patches of the last passes, for a job that is loaded while it runs: what the planning of a pass may look at, and how far the next pass may be.
 
 use crate::fault::Result;
+use crate::job::stream::RowsNeeded;
 use crate::job::{Header, Pattern};
 use crate::math::number::Bounded;
 use crate::pass::schedule;
@@ -36,12 +37,23 @@ impl FirstRow {
 
 impl RowHistory {
     /// Before the first pass.
-    pub(crate) const START: Self = Self { rows: [0; 3] };
+    pub(crate) const START: Self = Self { rows: [u16::MAX; 3] };
 
-    /// The planning of a pass in this row begins.
-    pub(crate) const fn enter(&mut self, row: u16) {
+    /// The planning of a pass in this row begins. Behind the first pass of a job, and where the rows are not next to those of the pass before it, the window begins
+    /// with it.
+    pub(crate) const fn enter(&mut self, header: &Header, row: u16) {
         let [last, before, _] = self.rows;
-        self.rows = [row, last, before];
+        self.rows = if self.jumps(header, row) {
+            [row; 3]
+        } else {
+            [row, last, before]
+        };
+    }
+
+    /// Whether a pass in this row, after the one that was entered, lies outside its window: in another cell of a region, or beyond a gap.
+    pub(crate) const fn jumps(&self, header: &Header, row: u16) -> bool {
+        let [own, ..] = self.rows;
+        row < own || row >= own.saturating_add(header.window)
     }
 
     /// Side spans that the planning of the pass may look at, from the first one.
@@ -55,16 +67,6 @@ impl RowHistory {
             },
             header,
         )
-    }
-
-    /// The first row that the planning of the pass after it needs, at this side parameter.
-    pub(crate) const fn first_needed(&self, header: &Header, side: SpanParameter) -> u16 {
-        let [own, before, _] = self.rows;
-        match FirstRow::of(header) {
-            FirstRow::Own => side.span,
-            FirstRow::Before => own,
-            FirstRow::Left => before,
-        }
     }
 
     fn from(at: u16, header: &Header) -> u16 {
@@ -109,15 +111,22 @@ impl RowHistory {
         })
     }
 
-    /// The first and the last row that the planning of the pass after this one needs: at `side`, with lines at `step` beside it, as far as that is known.
+    /// The rows that the planning of the pass after this one needs: at `side`, with lines at `step` beside it, as far as that is known.
     pub(crate) fn needed(
         &self,
         header: &Header,
         side: SpanParameter,
         step: Option<f32>,
         width: impl Fn(u16) -> f32,
-    ) -> [u16; 2] {
-        let first = self.first_needed(header, side);
+    ) -> RowsNeeded {
+        let [own, before, _] = self.rows;
+        let behind = match FirstRow::of(header) {
+            FirstRow::Own => None,
+            FirstRow::Before => Some(own),
+            FirstRow::Left => Some(before),
+        };
+        let is_near = !self.jumps(header, side.span);
+        let first = behind.filter(|_| is_near).unwrap_or(side.span);
         let spans = Self::from(first, header);
         let step = step.unwrap_or(f32::INFINITY).at_least(0.0);
         let last = if step == f32::INFINITY {
@@ -126,6 +135,10 @@ impl RowHistory {
             // An interval that is too small is reported where it is planned.
             schedule::next_side(side, step, spans, width).map_or(side.span, |line| line.span.max(side.span))
         };
-        [first, last]
+        RowsNeeded {
+            behind,
+            own: side.span,
+            last,
+        }
     }
 }

@@ -18,6 +18,7 @@ use self::line::{NeighbourLine, Peak, PlaceOnPass, Task};
 use self::means::{at_end, exact, forecast, mean, nearer};
 use crate::fault::Result;
 use crate::job::program::Job;
+use crate::job::stream::RowsNeeded;
 use crate::job::{Header, Spacing};
 use crate::math::number::Bounded;
 use crate::pass::edge::{self, EdgeCrest, EdgeSearch};
@@ -114,8 +115,13 @@ impl StepOverEstimator {
     }
 
     /// The pass that is looked at from here on is in this row.
-    pub(crate) const fn enter_row(&mut self, row: u16) {
-        self.rows.enter(row);
+    pub(crate) const fn enter_row(&mut self, header: &Header, row: u16) {
+        self.rows.enter(header, row);
+    }
+
+    /// Rows of the last passes.
+    pub(crate) const fn rows(&self) -> &RowHistory {
+        &self.rows
     }
 
     /// Side parameter of the pass after the one at `from`, by the step to it.
@@ -127,8 +133,8 @@ impl StepOverEstimator {
             .next_side(job.header, from, step, |span| job.side_width(span))
     }
 
-    /// The first and the last row of patches that the planning of the next pass needs, at this side parameter.
-    pub(crate) fn rows_needed(&self, job: &Job<'_>, side: SpanParameter) -> [u16; 2] {
+    /// The rows of patches that the planning of the next pass needs, at this side parameter.
+    pub(crate) fn rows_needed(&self, job: &Job<'_>, side: SpanParameter) -> RowsNeeded {
         let expected = if job.header.spacing == Spacing::FirstOrder {
             Some(0.0)
         } else {

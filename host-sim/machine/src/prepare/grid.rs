@@ -282,6 +282,7 @@ fn finish(
     words.extend(widths(job, &path)?);
     words.extend(records);
     Ok(Prepared {
+        least_rows: 0,
         start: RunStart::FIRST,
         header,
         words,

@@ -11,7 +11,7 @@ mod geometry;
 mod grid;
 mod region;
 mod steps;
-mod stream;
+pub(crate) mod stream;
 
 use interp_core::sample::SpanParameter;
 use interp_core::{Header, Pattern, RunStart, Spacing, StepConfig, SurfaceKind, ToolSide, encode};
@@ -67,6 +67,8 @@ pub struct Prepared {
     pub along: Along,
     /// Step output, if the job gives one.
     pub steps: Option<StepConfig>,
+    /// Rows of a streamed job that have to be in the store at once.
+    pub least_rows: usize,
     /// Where a run begins: at the start of the job, or where a run that was cut short is resumed.
     pub start: RunStart,
 }
@@ -144,6 +146,7 @@ pub fn prepare(job: &Job) -> Result<Prepared, JobError> {
         edges: 0,
         links: 0,
         window: 0,
+        strips: 0,
         axes: None,
     };
     let mut prepared = match &job.surface {
@@ -202,6 +205,7 @@ fn revolved(
     words.extend(widths(job, &path)?);
     words.extend(record.to_words());
     Ok(Prepared {
+        least_rows: 0,
         start: RunStart::FIRST,
         header: Header { kind, ..header },
         words,

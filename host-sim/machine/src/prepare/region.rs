@@ -3,8 +3,7 @@
 //! Vertices are rounded to places of the path and the side parameter, 2^-21 of a span. The first and the last line are the first and the last that meet an interval
 //! that is long enough, so the machine finds a pass on both. A cell that holds no pass is left out.
 
-use interp_core::STORE_WORDS;
-use interp_core::job::region::{CROSSINGS_MAX, EDGE_WORDS, Edge, FRACTION_BITS, REGION_SPANS_MAX};
+use interp_core::job::region::{CROSSINGS_MAX, Edge, FRACTION_BITS, REGION_SPANS_MAX};
 use job::{Along, Job, JobError, Region};
 
 use super::geometry::SurfaceEvaluator;
@@ -38,7 +37,7 @@ pub(super) fn check_job(job: &Job) -> Result<(), JobError> {
 /// Adds the region's words; returns where its first pass starts, (u, v).
 ///
 /// # Errors
-/// The region takes too many words, meets a line too often, or holds no pass.
+/// The region has too many edges, meets a line too often, or holds no pass.
 pub(super) fn add(job: &Job, region: &Region, prepared: &mut Prepared) -> Result<[f64; 2], JobError> {
     let no = |what: String, remedy: &str| Err(job.origin.error(KEY, what, remedy));
     if prepared.path.spans().max(prepared.side.spans()) > usize::from(REGION_SPANS_MAX) {
@@ -85,16 +84,13 @@ pub(super) fn add(job: &Job, region: &Region, prepared: &mut Prepared) -> Result
             "draw a wider region",
         );
     };
-    let words = prepared.words.len() + EDGE_WORDS * records.len();
-    if words > STORE_WORDS {
+    let Ok(edges) = u16::try_from(records.len()) else {
         return no(
-            format!(
-                "the surface and its region take {words} words, more than the {STORE_WORDS} of the board's store"
-            ),
-            "simplify the loops, use fewer knots, or cut the part into several jobs",
+            format!("the region has {} edges, more than {}", records.len(), u16::MAX),
+            "simplify the loops, or cut the part into several jobs",
         );
-    }
-    prepared.header.edges = u16::try_from(records.len()).unwrap_or(u16::MAX);
+    };
+    prepared.header.edges = edges;
     prepared.words.extend(records.into_flattened());
     let (path, side) = (parameter(&prepared.path, path), parameter(&prepared.side, side));
     Ok(match job.along {

@@ -242,6 +242,7 @@ fn surface_on(line: &Curve) -> (Surface, f64) {
         edges: 0,
         links: 0,
         window: 0,
+        strips: 0,
         axes: None,
         ..Header::default()
     };

@@ -4,6 +4,7 @@ use super::Run;
 use super::travel::{Next, Travel};
 use crate::fault::Result;
 use crate::job::program::Job;
+use crate::job::stream::RowsNeeded;
 use crate::job::{Pattern, Spacing};
 use crate::pass::front::{FrontSequence, NextRoute};
 use crate::pass::lines::{NextPass, RegionLines};
@@ -147,10 +148,11 @@ impl Run {
     pub(crate) fn plan(&mut self, job: &Job<'_>, rest: &mut [i32], spent: u32) {
         let has_work = match &mut self.planning {
             PassPlanning::Fronts(fronts) => return fronts.plan(job, rest, spent),
-            PassPlanning::Scan(scan) => {
+            PassPlanning::Scan(scan) if job.header.spacing == Spacing::Exact => {
                 scan.plan(job);
                 scan.has_work()
             }
+            PassPlanning::Scan(_) => false,
         };
         if self.lines.is_in_use() {
             if self.is_pass_due() && !has_work {
@@ -214,7 +216,11 @@ impl Run {
     fn seek_pass(&mut self, job: &Job<'_>) -> Result<NextPass> {
         if self.lines.is_line_over() {
             let step = self.find_step_over(job);
-            return Ok(if self.lines.go_on(job, step)? {
+            let rows = match &self.planning {
+                PassPlanning::Scan(scan) => Some(scan.estimator_ref().rows()),
+                PassPlanning::Fronts(_) => None,
+            };
+            return Ok(if self.lines.go_on(job, step, rows)? {
                 NextPass::Sought
             } else {
                 NextPass::None
@@ -318,10 +324,17 @@ impl Run {
         }
     }
 
-    /// The first and the last row of patches that the next tick and the planning after it need, where the next tick begins a pass.
-    pub(crate) fn rows_needed(&mut self, job: &Job<'_>) -> Option<[u16; 2]> {
+    /// The rows of patches that the next tick and the planning after it need, where the next tick begins a pass.
+    pub(crate) fn rows_needed(&mut self, job: &Job<'_>) -> Option<RowsNeeded> {
         if self.travel.next != Next::Over {
             return None;
+        }
+        if self.lines.is_in_use() {
+            let side = self
+                .lines
+                .next_side(job.header)
+                .filter(|_| self.next_pass == NextPass::Found && self.pending.is_none());
+            return side.and_then(|side| self.rows_ahead(job, side));
         }
         let step = match self.step_over {
             Some(step) => step,
@@ -330,14 +343,11 @@ impl Run {
         self.step_over = Some(step);
         // A step that is too small is reported by the tick.
         let side = self.side_after(job, step).ok()?;
-        match &self.planning {
-            PassPlanning::Scan(scan) => Some(scan.estimator_ref().rows_needed(job, side)),
-            PassPlanning::Fronts(_) => None,
-        }
+        self.rows_ahead(job, side)
     }
 
     /// The same for the look-ahead of a job with limits, over the next pass at this side parameter.
-    pub(crate) fn rows_ahead(&self, job: &Job<'_>, side: SpanParameter) -> Option<[u16; 2]> {
+    pub(crate) fn rows_ahead(&self, job: &Job<'_>, side: SpanParameter) -> Option<RowsNeeded> {
         match &self.planning {
             PassPlanning::Scan(scan) => Some(scan.estimator_ref().rows_needed(job, side)),
             PassPlanning::Fronts(_) => None,

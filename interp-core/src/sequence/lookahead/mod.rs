@@ -355,7 +355,8 @@ impl Lookahead {
                 NextPass::Sought => Task::Seek,
                 NextPass::Found => {
                     out.next = lines.take(job.header);
-                    let is_joined = |route: &Route| lines.joins(job.header, &out.route, route);
+                    let rows = estimator.as_deref().map(StepOverEstimator::rows);
+                    let is_joined = |route: &Route| lines.joins(job.header, &out.route, route, rows);
                     out.steps_over =
                         job.header.pattern == Pattern::Zigzag && out.next.as_ref().is_some_and(is_joined);
                     self.choose_link(job, axes, out)
@@ -476,7 +477,8 @@ impl Lookahead {
             }
         };
         if header.edges > 0 {
-            return Ok(!lines.go_on(job, step)?);
+            let rows = estimator.as_deref().map(StepOverEstimator::rows);
+            return Ok(!lines.go_on(job, step, rows)?);
         }
         if !schedule::is_last(out.route.side, header.side_spans) {
             let side = match estimator {

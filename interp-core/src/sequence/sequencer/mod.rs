@@ -16,6 +16,7 @@ use crate::feed::turn::Turn;
 use crate::job::AxisLimits;
 use crate::job::links::Link;
 use crate::job::program::Job;
+use crate::job::stream::RowsNeeded;
 use crate::math::number::Bounded;
 use crate::pass::route::Route;
 use crate::pass::run::Run;
@@ -270,9 +271,9 @@ impl Sequencer {
         }
     }
 
-    /// The first and the last row of patches that are needed to go on, where the tool stands before a pass whose successor is to be planned next: at the end of the pass before it, or
+    /// The rows of patches that are needed to go on, where the tool stands before a pass whose successor is to be planned next: at the end of the pass before it, or
     /// above its start. With the pass begins the planning of that successor.
-    pub(crate) fn rows_needed(&self, job: &Job<'_>, run: &Run) -> Option<[u16; 2]> {
+    pub(crate) fn rows_needed(&self, job: &Job<'_>, run: &Run) -> Option<RowsNeeded> {
         if self.has_rows || self.pending.is_some() || !self.is_planned() {
             return None;
         }

@@ -318,7 +318,7 @@ impl Sequencer {
             },
             Planning::Requested(pass) => {
                 if let (Some(estimator), _) = run.estimator_and_lines() {
-                    estimator.enter_row(next.route.side.span);
+                    estimator.enter_row(job.header, next.route.side.span);
                 }
                 if pass == self.first.pass {
                     // It begins at rest, wherever the pass before it would have led.
