@@ -102,10 +102,14 @@ fn curved_jobs_within_limits_end_at_their_own_scallop_height() {
 fn failures(name: &str, start: Start, scallop_mm: f64) -> Vec<String> {
     let mut job = curved(name, start, Pattern::Zigzag, 3600.0);
     job.scallop_mm = scallop_mm;
-    let prepared = prepare(&job).unwrap();
-    let timed = inspect::time_run(&job, &prepared, &()).unwrap();
+    verified(&job)
+}
+
+fn verified(job: &Job) -> Vec<String> {
+    let prepared = prepare(job).unwrap();
+    let timed = inspect::time_run(job, &prepared, &()).unwrap();
     let requirements = inspect::Requirements::default();
-    let found = inspect::verify_run(&job, &prepared, &timed, None, &requirements, &()).unwrap();
+    let found = inspect::verify_run(job, &prepared, &timed, None, &requirements, &()).unwrap();
     found.failures
 }
 
@@ -195,4 +199,26 @@ fn bends_hold_the_limits() {
 fn bends_hold_the_limits_everywhere() {
     let surfaces = SURFACES.map(|(name, _)| name);
     bends(&surfaces, &[0.2, 0.1, 0.05, 0.02, 0.01], &[600.0, 3600.0, 6000.0]);
+}
+
+/// Passes around the top of the cap, which is the first line or the last one: samples, scallop height and limits.
+#[test]
+fn passes_around_a_pole_pass_the_verifier() {
+    for (is_last, start, pattern) in [
+        (false, Start::Edge, Pattern::Zigzag),
+        (true, Start::Edge, Pattern::Zig),
+        (true, Start::Middle, Pattern::Zigzag),
+        (false, Start::Middle, Pattern::Zig),
+    ] {
+        let mut job = curved("sphere_cap", start, pattern, 1200.0);
+        (job.along, job.scallop_mm) = (job::Along::V, 0.02);
+        if is_last && let job::SurfaceSpec::Nurbs(spec) = &mut job.surface {
+            spec.poles_mm.reverse();
+        }
+        let failures = verified(&job);
+        assert!(
+            failures.is_empty(),
+            "{is_last} {start:?} {pattern:?}: {failures:?}"
+        );
+    }
 }

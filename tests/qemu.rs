@@ -120,7 +120,15 @@ fn constant_scallop_height() {
         (job.spacing, job.scallop_mm) = (Spacing::Constant(start), 0.05);
         prepare(&job).unwrap()
     };
+    let around_pole = {
+        let path = format!("{}/../jobs/sphere_cap.toml", env!("CARGO_MANIFEST_DIR"));
+        let mut job = job_file::load(path.as_ref()).unwrap();
+        job.spacing = Spacing::Constant(Start::Middle);
+        (job.along, job.scallop_mm) = (job::Along::V, 0.05);
+        prepare(&job).unwrap()
+    };
     compare_prepared(&[
+        ("sphere_cap around its pole", around_pole),
         ("freeform", constant("freeform", Start::Edge)),
         ("sphere_cap", constant("sphere_cap", Start::Middle)),
         ("torus", job("torus")),

@@ -6,7 +6,7 @@ use super::derivatives::Derivatives;
 use super::region::RegionEdges;
 use super::surface::Surface;
 use glam::DVec3;
-use job::{Along, Job, Pattern, Region, Side, Spacing};
+use job::{Along, Job, Pattern, Region, Side, Spacing, Start};
 
 /// A first derivative shorter than this share of the other one (each times its range) marks a pole, where the patch's
 /// edge collapses to a point. Rounding leaves about 1e-15 there; a regular surface stays above 1e-4.
@@ -207,6 +207,31 @@ impl Oracle {
     #[must_use]
     pub fn side_range(&self) -> [f64; 2] {
         self.surface.range(self.across())
+    }
+
+    /// Side parameter of the first pass and of the last: on the boundaries; from the middle to the first boundary; from the last boundary to the first where passes
+    /// of constant scallop height begin on the edge, and the last one alone is a point.
+    #[must_use]
+    pub fn outer_passes(&self) -> [f64; 2] {
+        let [first, last] = self.side_range();
+        match self.spacing {
+            Spacing::Constant(Start::Middle) => [0.5 * (first + last), first],
+            Spacing::Constant(Start::Edge) if self.is_point(last) && !self.is_point(first) => [last, first],
+            _ => [first, last],
+        }
+    }
+
+    /// Whether the line at a side parameter is a point.
+    fn is_point(&self, side: f64) -> bool {
+        let [low, high] = self.path_range();
+        let [first, last] = self.side_range();
+        let (u, v) = self.swapped(0.5 * (low + high), side);
+        let at = self.surface.at(u, v);
+        let (along, across) = match self.along {
+            Along::U => (at.u, at.v),
+            Along::V => (at.v, at.u),
+        };
+        along.length() * (high - low) <= POLE_SHARE * across.length() * (last - first)
     }
 
     /// Converts (path, side) to (u, v), and back.

@@ -3,7 +3,7 @@
 use super::contact::Oracle;
 use super::report::{AccuracyReport, SampleLocation};
 use glam::DVec3;
-use job::{Pattern, Spacing, Start};
+use job::{Pattern, Spacing};
 
 /// Excess of a last step over that of its feed, as a share of the programmed one, that the rounding of its parameters makes.
 const LAST_STEP_ROUNDING: f64 = 1e-5;
@@ -153,11 +153,7 @@ impl Verifier {
     pub fn finish(mut self) -> AccuracyReport {
         if let Some(pass) = self.current {
             self.report.complete = pass.finished;
-            let [first, last] = self.oracle.side_range();
-            let end = match self.oracle.spacing {
-                Spacing::Constant(Start::Middle) => first,
-                _ => last,
-            };
+            let [_, end] = self.oracle.outer_passes();
             self.report.last_on_boundary = if self.oracle.region.is_some() {
                 self.check_line(pass.side);
                 self.is_cell_done(pass.side) && self.cells_without_pass(self.cell_index + 1)
@@ -295,10 +291,7 @@ impl Verifier {
                 self.begin_interval(sample, start, spot);
             }
             None => {
-                let start = match self.oracle.spacing {
-                    Spacing::Constant(Start::Middle) => 0.5 * (first + last),
-                    _ => first,
-                };
+                let [start, _] = self.oracle.outer_passes();
                 let is_near = (side - start).abs() <= START_SHARE * (last - first);
                 self.report.first_on_boundary = sample.pass == 0 && (side == start || is_curve && is_near);
             }

@@ -112,15 +112,18 @@ pub enum Spacing {
     Constant = 2,
     /// The same from the middle of the side parameter to its end, then from the middle to its start.
     ConstantFromMiddle = 3,
+    /// The same from the last side boundary to the first.
+    ConstantFromEnd = 4,
 }
 
 impl Spacing {
     /// Every rule, in order of its code.
-    pub const ALL: [Self; 4] = [
+    pub const ALL: [Self; 5] = [
         Self::Exact,
         Self::FirstOrder,
         Self::Constant,
         Self::ConstantFromMiddle,
+        Self::ConstantFromEnd,
     ];
 
     /// The rule with this code.
@@ -132,7 +135,10 @@ impl Spacing {
     /// Whether the passes are curves of constant scallop height.
     #[must_use]
     pub const fn is_constant(self) -> bool {
-        matches!(self, Self::Constant | Self::ConstantFromMiddle)
+        matches!(
+            self,
+            Self::Constant | Self::ConstantFromMiddle | Self::ConstantFromEnd
+        )
     }
 }
 

@@ -35,7 +35,7 @@ const POLE_STEP: u64 = 1 << 60;
 /// Greatest correction of a step beyond a station, as a share of what is beyond it.
 const SHARE_MAX: f32 = 1.0 / 256.0;
 
-/// The same on a front, whose intervals are two periods long, except on short passes.
+/// The same on passes of constant scallop height: the intervals of a front are two periods long, except on short passes, and the shortest passes are lines beside a point.
 const CROSSINGS_ON_FRONT_MAX: u8 = 4;
 
 /// A run: the travel and the patch buffer.
@@ -409,7 +409,7 @@ impl Run {
         if self.travel.is_at_start() && self.continues(&start, rest, feed_factor) {
             return Ok(());
         }
-        let most = if self.travel.route.front.is_some() {
+        let most = if job.header.spacing.is_constant() {
             CROSSINGS_ON_FRONT_MAX
         } else {
             CROSSINGS_MAX

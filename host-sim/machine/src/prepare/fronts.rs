@@ -1,7 +1,7 @@
 //! What passes of constant scallop height are refused for.
 
-use interp_core::surface::{PolynomialRecord, RationalRecord};
-use interp_core::{STORE_WORDS, SurfaceKind, front_words};
+use interp_core::surface::{Edges, PolynomialRecord, RationalRecord};
+use interp_core::{STORE_WORDS, Spacing, SurfaceKind, front_words};
 use job::{Job, JobError};
 
 use super::Prepared;
@@ -16,7 +16,7 @@ const CREASE_MAX: f64 = 1e-3;
 /// Radius of a circle that is a point, mm.
 const POINT_MM: f64 = 1e-5;
 
-/// Refuses a crease, a pole beside the passes, too many path spans, and a job for whose stations the store has no room.
+/// Refuses a crease, too many path spans, and a job for whose stations the store has no room.
 ///
 /// # Errors
 /// As above.
@@ -25,18 +25,6 @@ pub(super) fn check(job: &Job, prepared: &Prepared) -> Result<(), JobError> {
         return Ok(());
     }
     let no = |what: String, remedy: &str| Err(job.origin.error("cut.spacing", what, remedy));
-    if has_pole_beside(job, prepared) {
-        let other = match job.along {
-            job::Along::U => "v",
-            job::Along::V => "u",
-        };
-        let remedy = format!("write along = \"{other}\", so that the passes end at the pole, or {REMEDY}");
-        return no(
-            "passes of constant scallop height cannot be made where a boundary beside them is a single point"
-                .to_owned(),
-            &remedy,
-        );
-    }
     if let Some(crease) = crease(job, prepared) {
         return no(crease, REMEDY);
     }
@@ -96,30 +84,40 @@ fn crease(job: &Job, prepared: &Prepared) -> Option<String> {
     None
 }
 
-/// Whether a side boundary is a single point.
-fn has_pole_beside(job: &Job, prepared: &Prepared) -> bool {
+/// Where passes from the edge begin: on the last side boundary where that alone is a single point.
+pub(super) fn spacing_from_edge(job: &Job, prepared: &Prepared) -> Spacing {
+    match side_poles(job, prepared) {
+        [false, true] => Spacing::ConstantFromEnd,
+        _ => Spacing::Constant,
+    }
+}
+
+/// Whether the first and the last side boundary are single points.
+fn side_poles(job: &Job, prepared: &Prepared) -> [bool; 2] {
     let widths = prepared.path.spans() + prepared.side.spans();
     let records = prepared.words.get(widths..).unwrap_or(&[]);
+    let mut poles = [false; 2];
+    let mut add = |edges: Edges| {
+        poles = [poles[0] || edges.side_start, poles[1] || edges.side_end];
+    };
     match prepared.header.kind {
-        SurfaceKind::Polynomial => records
-            .as_chunks()
-            .0
-            .iter()
-            .map(|words| PolynomialRecord::from_words(words).edges)
-            .any(|edges| edges.side_start || edges.side_end),
-        SurfaceKind::Rational => records
-            .as_chunks()
-            .0
-            .iter()
-            .map(|words| RationalRecord::from_words(words).edges)
-            .any(|edges| edges.side_start || edges.side_end),
-        SurfaceKind::RevolvedAlongProfile => false,
-        SurfaceKind::RevolvedAroundAxis => match &job.surface {
-            job::SurfaceSpec::Revolved { radius_mm, u, .. } => u.iter().any(|u| {
+        SurfaceKind::Polynomial => {
+            for words in records.as_chunks().0 {
+                add(PolynomialRecord::from_words(words).edges);
+            }
+        }
+        SurfaceKind::Rational => {
+            for words in records.as_chunks().0 {
+                add(RationalRecord::from_words(words).edges);
+            }
+        }
+        SurfaceKind::RevolvedAlongProfile => {}
+        SurfaceKind::RevolvedAroundAxis => {
+            if let job::SurfaceSpec::Revolved { radius_mm, u, .. } = &job.surface {
                 let [c3, c2, c1, c0] = *radius_mm;
-                (((c3 * u + c2) * u + c1) * u + c0).abs() < POINT_MM
-            }),
-            _ => false,
-        },
+                poles = u.map(|u| (((c3 * u + c2) * u + c1) * u + c0).abs() < POINT_MM);
+            }
+        }
     }
+    poles
 }

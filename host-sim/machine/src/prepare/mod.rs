@@ -163,6 +163,9 @@ pub fn prepare(job: &Job) -> Result<Prepared, JobError> {
         Some(region) => region::add(job, region, &mut prepared)?,
         None => [us[0], vs[0]],
     };
+    if prepared.header.spacing == Spacing::Constant {
+        prepared.header.spacing = fronts::spacing_from_edge(job, &prepared);
+    }
     prepared.header.axes = axes::axes(job, sign, start)?;
     fronts::check(job, &prepared)?;
     stream::fit(job, prepared)

@@ -37,6 +37,8 @@ const ADVANCE_MIN: f32 = 1e-6;
 enum Task {
     /// Measure the length of the passes.
     Length,
+    /// Find whether the boundary ahead is a single point.
+    Ahead,
     /// Set the front to the first line.
     Clear,
     /// Step at each station and in the middle of each interval.
@@ -45,6 +47,8 @@ enum Task {
     Level,
     /// The current front, moved.
     Shift,
+    /// The point ahead, in place of the limits.
+    Point,
     /// The limits: sweeps and hull, twice.
     Forwards,
     Backwards,
@@ -68,6 +72,8 @@ enum Task {
 pub(crate) enum Made {
     /// A front with a part before the boundary.
     Front,
+    /// A straight one, too short for its stations: the line at this distance from the first one.
+    Line(i32),
     /// Every station is at the boundary or beyond it.
     Beyond,
 }
@@ -85,6 +91,13 @@ pub(crate) struct Advance {
     /// The next one is made straight; the least and the greatest step, units of the fronts.
     is_level: bool,
     steps: [i32; 2],
+    /// The next one is made straight because an interval between its stations would be shorter than a period's arc, mm. Its length, and where it is.
+    is_short: bool,
+    period_mm: f32,
+    front_mm: f32,
+    line: i32,
+    /// The current front is before the boundary everywhere.
+    is_whole: bool,
     /// The curve turns too sharply; it was replaced by the current one, moved by the least advance, units of the fronts.
     is_sharp: bool,
     is_shifted: bool,
@@ -92,6 +105,8 @@ pub(crate) struct Advance {
     round: u8,
     measured: u8,
     is_lowered: bool,
+    /// Most by which a station is to be lowered.
+    excess: i32,
     stations: Stations,
     pub(crate) direction: Direction,
     cursor: SideCursor,
@@ -105,7 +120,25 @@ pub(crate) struct Advance {
     advanced: f32,
     /// The passes' ends are poles.
     poles: [bool; 2],
+    /// The boundary ahead is a single point, which every station comes to, or none.
+    is_point_ahead: bool,
+    approach: Approach,
+    /// The current front is half a step before that point, or nearer.
+    is_covered: bool,
+    /// The surface is faulty at a step.
+    fault: Option<Fault>,
     made: Option<Made>,
+}
+
+/// How the next front comes to a boundary that is a single point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Approach {
+    /// Every station so far steps as far as the point.
+    Reaches,
+    /// It ends half a step before the point, where it is not farther away.
+    StopsBefore,
+    /// The next pass is the point.
+    OnPoint,
 }
 
 impl Advance {
@@ -117,12 +150,18 @@ impl Advance {
         is_next_straight: true,
         is_level: false,
         steps: [0; 2],
+        is_short: false,
+        period_mm: 0.0,
+        front_mm: 0.0,
+        line: 0,
+        is_whole: true,
         is_sharp: false,
         is_shifted: false,
         shift: 0,
         round: 0,
         measured: 0,
         is_lowered: false,
+        excess: 0,
         stations: Stations { spans: 1, bits: 6 },
         direction: Direction::FROM_EDGE,
         cursor: SideCursor::NONE,
@@ -134,6 +173,10 @@ impl Advance {
         length_mm: 0.0,
         advanced: 0.0,
         poles: [false; 2],
+        is_point_ahead: false,
+        approach: Approach::Reaches,
+        is_covered: false,
+        fault: None,
         made: None,
     };
 
@@ -150,7 +193,7 @@ impl Advance {
             self.length_mm = 0.0;
             self.before = None;
         }
-        self.task = if is_first { Task::Length } else { Task::Clear };
+        self.task = if is_first { Task::Length } else { Task::Ahead };
     }
 
     /// Begins with the front after the current one.
@@ -175,7 +218,11 @@ impl Advance {
         self.advanced = 0.0;
         self.steps = [i32::MAX, 0];
         self.is_level = false;
+        self.is_short = false;
+        (self.front_mm, self.line, self.is_whole) = (0.0, i32::MAX, true);
         self.is_shifted = false;
+        self.fault = None;
+        (self.approach, self.is_covered) = (Approach::Reaches, true);
         self.foot.begin((0, 0));
     }
 
@@ -190,14 +237,15 @@ impl Advance {
     /// What was made, once it is.
     ///
     /// # Errors
-    /// [`FaultKind::IntervalTooSmall`] where the front does not move.
+    /// Where the front does not move: that of the surface ahead, or [`FaultKind::IntervalTooSmall`].
     pub(crate) fn made(&self) -> Option<Result<Made, Fault>> {
         if self.has_work() {
             return None;
         }
         let made = self.made?;
-        Some(if self.advanced < ADVANCE_MIN && made == Made::Front {
-            Err(Fault::new(FaultKind::IntervalTooSmall, self.advanced))
+        Some(if self.advanced < ADVANCE_MIN && made != Made::Beyond {
+            let stalled = Fault::new(FaultKind::IntervalTooSmall, self.advanced);
+            Err(self.fault.unwrap_or(stalled))
         } else {
             Ok(made)
         })
@@ -215,10 +263,10 @@ impl Advance {
     const fn expected_cycles(&self) -> u32 {
         match self.task {
             Task::Done => 0,
-            Task::Length => cost::LENGTH,
+            Task::Length | Task::Ahead => cost::LENGTH,
             Task::Step => cost::of(&cost::STEP, self.foot.next),
             Task::Crest => cost::of(&cost::CREST, self.search.next),
-            Task::Clear | Task::Apply | Task::Level | Task::Shift => cost::COPY,
+            Task::Clear | Task::Apply | Task::Level | Task::Shift | Task::Point => cost::COPY,
             Task::Forwards | Task::Backwards | Task::Compare | Task::Lower | Task::Eliminate => cost::SWEEP,
             Task::Hull => cost::HULL,
             Task::Substitute => cost::SUBSTITUTE,
@@ -231,6 +279,7 @@ impl Advance {
         let record = self.patch.record();
         match self.task {
             Task::Length => self.measure_length(job),
+            Task::Ahead => self.look_ahead(job),
             Task::Step => {
                 self.pass_over(table);
                 if self.task == Task::Step {
@@ -260,6 +309,16 @@ impl Advance {
         }
     }
 
+    /// By how much a front that would be too sharp is moved: the least advance; half the least step where a station would not advance at all.
+    fn shift(&self) -> i32 {
+        let [least, _] = self.steps;
+        if self.shift < least / 16 {
+            least / 2
+        } else {
+            self.shift
+        }
+    }
+
     fn next_station(&mut self, end: u16) {
         self.station += 1;
         if self.station < end {
@@ -271,18 +330,23 @@ impl Advance {
                 self.start_front();
                 return;
             }
+            Task::Step if self.is_point_ahead && (self.is_covered || self.approach == Approach::Reaches) => {
+                self.approach = Approach::OnPoint;
+                (Task::Point, 0)
+            }
             Task::Step => {
                 let [least, most] = self.steps.map(to_f32);
-                self.is_level = self.is_straight && most <= LEVEL * least;
-                let next = if self.is_level {
+                self.is_short = self.is_whole
+                    && self.front_mm < self.period_mm * to_f32(i32::from(count.saturating_sub(1)));
+                self.is_level = self.is_straight && most <= LEVEL * least && !self.is_short;
+                let next = if self.is_level || self.is_short {
                     Task::Level
                 } else {
                     Task::Forwards
                 };
                 (next, 0)
             }
-            Task::Level => (Task::Eliminate, 0),
-            Task::Shift => (Task::Eliminate, 0),
+            Task::Level | Task::Shift | Task::Point => (Task::Eliminate, 0),
             Task::Forwards => (Task::Backwards, 0),
             Task::Backwards => {
                 self.limiter.begin();
@@ -297,10 +361,21 @@ impl Advance {
             Task::Eliminate => (Task::Substitute, 0),
             Task::Substitute => {
                 self.is_lowered = false;
-                if self.is_sharp && !self.is_shifted {
+                if self.is_sharp && self.is_point_ahead && !self.is_short {
+                    // Stations wait before the point: moved as a whole, the front would not advance.
+                    self.is_short = true;
+                    (Task::Level, 0)
+                } else if self.is_sharp && !self.is_shifted {
                     self.is_shifted = true;
                     (Task::Shift, 0)
-                } else if self.is_level || self.is_shifted {
+                } else if self.is_point_ahead && self.is_covered {
+                    (Task::Done, count)
+                } else if self.is_level
+                    || self.is_short
+                    || self.is_shifted
+                    || self.approach == Approach::OnPoint
+                {
+                    self.excess = 0;
                     self.search.begin(self.crest_place(0));
                     (Task::Crest, 0)
                 } else {
@@ -317,6 +392,17 @@ impl Advance {
                 self.search.begin(self.crest_place(0));
                 (Task::Crest, 0)
             }
+            Task::Crest if self.is_lowered && self.approach == Approach::OnPoint => {
+                self.start_front();
+                self.approach = Approach::StopsBefore;
+                return;
+            }
+            Task::Crest if self.is_lowered && self.is_short && self.measured < MEASUREMENTS => {
+                self.measured += 1;
+                self.line = self.line.saturating_sub(self.excess);
+                (Task::Level, 0)
+            }
+            Task::Crest if self.is_short => (Task::Done, count),
             Task::Crest if self.is_lowered && self.is_level => {
                 // Not straight after all, or with the common margin.
                 self.is_level = false;
@@ -362,12 +448,20 @@ impl Advance {
                 let [least, _] = self.steps;
                 let more = if self.is_level { LEVEL_MORE } else { 1.0 };
                 let step = truncated(to_f32(least) * more);
-                let next = table.word(Column::Front, station).saturating_add(step);
+                let next = if self.is_short {
+                    self.line
+                } else {
+                    table.word(Column::Front, station).saturating_add(step)
+                };
                 table.set_word(Column::Next, station, next.min(self.direction.cap()));
                 table.set_word(Column::Mark, station, UNMEASURED);
             }
+            Task::Point => {
+                table.set_word(Column::Next, station, self.direction.cap());
+                table.set_word(Column::Mark, station, UNMEASURED);
+            }
             Task::Shift => {
-                let next = table.word(Column::Front, station).saturating_add(self.shift);
+                let next = table.word(Column::Front, station).saturating_add(self.shift());
                 table.lower(station, next.min(self.direction.cap()));
             }
             _ => {}

@@ -56,6 +56,8 @@ pub(crate) struct Tools<'a, 'b> {
     pub(crate) job: &'a Job<'b>,
     pub(crate) cursor: &'a mut SideCursor,
     pub(crate) direction: &'a Direction,
+    /// The boundary ahead is a single point.
+    pub(crate) is_point_ahead: bool,
 }
 
 impl Tools<'_, '_> {

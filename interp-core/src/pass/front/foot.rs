@@ -5,7 +5,7 @@
 
 use core::ops::Deref;
 
-use crate::fault::Result;
+use crate::fault::{Fault, Result};
 use crate::math::arith::{sqrt, to_f32, truncated};
 use crate::math::number::Bounded;
 use crate::pass::front::crest::{CURRENT, Place, Tools, offset, shifted};
@@ -68,6 +68,8 @@ pub(crate) struct FootStep {
     /// From the foot to the place, path parameter, and the step across.
     along: f32,
     across: f32,
+    /// Half a step straight across.
+    half: f32,
     /// Share of the step that is left at an end of the pass.
     share: f32,
     forms: [Form; 3],
@@ -82,7 +84,7 @@ pub(crate) enum Found {
     /// The next front at the place, units of the fronts.
     Front(i32),
     /// The surface is faulty there.
-    Faulty,
+    Faulty(Fault),
 }
 
 impl FootStep {
@@ -94,6 +96,7 @@ impl FootStep {
         base: 0,
         along: 0.0,
         across: 0.0,
+        half: 0.0,
         share: 1.0,
         forms: [Form {
             path: 0.0,
@@ -108,6 +111,11 @@ impl FootStep {
         self.next = 0;
     }
 
+    /// Half a step straight across at the place, units of the fronts.
+    pub(crate) fn half_step(&self) -> i32 {
+        to_units(self.half)
+    }
+
     /// An evaluation. `is_end`: the place is an end of the pass; `scale`: the scallop height is this share of the limit.
     pub(crate) fn work<W: Deref<Target = [i32]>>(
         &mut self,
@@ -119,7 +127,7 @@ impl FootStep {
         let number = self.next;
         self.next = number.saturating_add(1);
         self.evaluate(tools, table, number, is_end, margin)
-            .unwrap_or(Found::Faulty)
+            .unwrap_or_else(Found::Faulty)
     }
 
     fn evaluate<W: Deref<Target = [i32]>>(
@@ -147,7 +155,12 @@ impl FootStep {
             }
             2 => {
                 let (middle, _) = shifted(table, tools.job, self.place, -0.5 * self.along);
-                let half = self.base.saturating_add(to_units(0.5 * self.across));
+                let mut half = self.base.saturating_add(to_units(0.5 * self.across));
+                if tools.is_point_ahead {
+                    // At the point itself there is no direction along the path.
+                    let left = tools.direction.end.saturating_sub(self.at);
+                    half = half.min(self.at.saturating_add(left - left / 4));
+                }
                 let frame = tools.frame(table, middle, half)?;
                 let [_, second, _] = &mut self.forms;
                 *second = Form::of(&frame, frame.scale(header, self.along, self.across, margin));
@@ -180,6 +193,7 @@ impl FootStep {
         // At an end of the pass the crest is half a step from a contact, and the next pass half a step from the crest along the boundary.
         let mut half = form.across(0.0, 0.25).unwrap_or(STEP_MAX);
         let least = half;
+        self.half = least;
         for square in [1.0, 0.25] {
             if square < 1.0 && !is_end {
                 break;

@@ -7,7 +7,7 @@ use crate::math::number::Bounded;
 use crate::pass::front::advance::{Advance, Made};
 use crate::pass::front::cost;
 use crate::pass::front::part::PartSearch;
-use crate::pass::front::side::{Direction, SideCursor};
+use crate::pass::front::side::{Direction, SideCursor, fine};
 use crate::pass::front::table::Table;
 use crate::pass::route::Route;
 use crate::sample::SpanParameter;
@@ -85,13 +85,16 @@ impl FrontSequence {
     /// Begins, with the first pass.
     pub(crate) fn start(&mut self, job: &Job<'_>) -> Route {
         self.cursor = SideCursor::new(job);
-        (self.part, self.fronts, self.swapped) = (0, 0, false);
+        (self.fronts, self.swapped) = (0, false);
         (self.is_ahead, self.begins_part) = (false, false);
-        self.direction = if job.header.spacing == Spacing::ConstantFromMiddle {
-            let [first, _] = Direction::FROM_MIDDLE;
-            first
-        } else {
-            Direction::FROM_EDGE
+        // A front that moves backwards is travelled as the second part from the middle is.
+        (self.part, self.direction) = match job.header.spacing {
+            Spacing::ConstantFromMiddle => {
+                let [first, _] = Direction::FROM_MIDDLE;
+                (0, first)
+            }
+            Spacing::ConstantFromEnd => (1, Direction::FROM_END),
+            _ => (0, Direction::FROM_EDGE),
         };
         self.part_search.stop();
         self.advance.begin(self.cursor, self.direction, true);
@@ -236,6 +239,11 @@ impl FrontSequence {
             Made::Front => {
                 self.line = Line::Front;
                 self.take_part(job)
+            }
+            Made::Line(at) => {
+                (self.line, self.is_last_part) = (Line::Front, true);
+                let (side, _) = self.cursor.seek(job, &self.direction, fine(at));
+                Ok(NextRoute::Pass(self.whole_line(job, side)))
             }
             Made::Beyond => {
                 self.line = Line::Last;

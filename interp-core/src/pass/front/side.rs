@@ -41,6 +41,12 @@ impl Direction {
         forwards: true,
         end: WHOLE,
     };
+    /// From the last boundary to the first.
+    pub(crate) const FROM_END: Self = Self {
+        origin: WHOLE,
+        forwards: false,
+        end: WHOLE,
+    };
     /// From the middle to the end, and from the middle to the start.
     pub(crate) const FROM_MIDDLE: [Self; 2] = [
         Self {

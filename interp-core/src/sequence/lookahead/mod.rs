@@ -471,7 +471,7 @@ impl Lookahead {
                 estimator.map_or(out.interval, |estimator| estimator.step(header, self.maximum))
             }
             Spacing::FirstOrder => out.interval,
-            Spacing::Constant | Spacing::ConstantFromMiddle => {
+            Spacing::Constant | Spacing::ConstantFromMiddle | Spacing::ConstantFromEnd => {
                 self.finish_short(out);
                 return Ok(true);
             }

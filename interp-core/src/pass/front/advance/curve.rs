@@ -117,7 +117,11 @@ impl Advance {
         }
         self.is_next_straight &= table.real(Column::NextSlope, station) == 0.0;
         if next < self.direction.end {
-            self.made = Some(Made::Front);
+            self.made = Some(if self.is_short {
+                Made::Line(next)
+            } else {
+                Made::Front
+            });
         }
         if front < self.direction.end {
             self.shift = self.shift.min(next.saturating_sub(front));

@@ -106,6 +106,7 @@ impl Advance {
             job,
             cursor: &mut self.cursor,
             direction: &self.direction,
+            is_point_ahead: self.is_point_ahead,
         };
         let Some(excess) = self.search.work(&mut tools, table, margin) else {
             return;
@@ -141,6 +142,7 @@ impl Advance {
         if excess > 0 {
             self.is_lowered = true;
             let lower = truncated(LOWER * to_f32(excess)).max(1);
+            self.excess = self.excess.max(lower);
             for at in [station, station + 1] {
                 let most = table.word(Column::Scratch, at).max(lower);
                 table.set_word(Column::Scratch, at, most);

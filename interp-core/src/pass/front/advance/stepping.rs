@@ -2,7 +2,7 @@
 
 use core::ops::DerefMut;
 
-use super::{Advance, CHUNK, SLOPE_MAX, Task};
+use super::{Advance, Approach, CHUNK, SLOPE_MAX, Task};
 use crate::job::program::Job;
 use crate::job::stations::Stations;
 use crate::math::arith::sqrt;
@@ -80,9 +80,22 @@ impl Advance {
             let period = header.feed_mm_s * header.period_s;
             let interval = (INTERVAL_PERIODS * period).at_least(INTERVAL_STEPS * step);
             self.stations = Stations::for_intervals(spans, longest / interval);
+            self.period_mm = period;
             self.limiter.turn_per_mm = (TURN_PER_PERIOD / period).at_most(1.0 / (RADIUS_STEPS * step));
-            (self.task, self.station) = (Task::Clear, 0);
+            (self.task, self.station) = (Task::Ahead, 0);
         }
+    }
+
+    /// Looks whether the boundary ahead is a single point.
+    pub(super) fn look_ahead(&mut self, job: &Job<'_>) {
+        let middle = SpanParameter {
+            span: 0,
+            fraction: 1 << 63,
+        };
+        let (direction, end) = (&self.direction, self.direction.end);
+        let frame = Frame::at(&mut self.patch, job, &mut self.cursor, direction, middle, end);
+        self.is_point_ahead = frame.is_ok_and(|frame| frame.e <= POLE_MAX * frame.g);
+        (self.task, self.station) = (Task::Clear, 0);
     }
 
     /// Passes over places so far beyond the boundary that no pass comes near them: the front there is as far as the limits allow.
@@ -127,19 +140,31 @@ impl Advance {
             job,
             cursor: &mut self.cursor,
             direction: &self.direction,
+            is_point_ahead: self.is_point_ahead,
         };
         let front = match self.foot.work(&mut tools, table, is_end, MARGIN) {
             Found::More(half) => {
                 if let (Some((frame, slope)), false) = (half, is_middle) {
                     self.note(table, station, &frame, slope);
+                    self.front_mm += table.real(Column::Speed, station) * self.stations.length(job, station);
                 }
                 return;
             }
             Found::Front(front) => front,
             // The tool reports the fault where it reaches it.
-            Found::Faulty => table.word(Column::Front, station).saturating_add(FAULTY_STEP),
+            Found::Faulty(fault) => {
+                self.fault = Some(fault);
+                table.word(Column::Front, station).saturating_add(FAULTY_STEP)
+            }
         };
         let own = front_at(table, station, is_middle, job);
+        self.line = self.line.min(front);
+        let front = if self.is_point_ahead {
+            self.before_point(own, front)
+        } else {
+            front
+        };
+        self.is_whole &= own < self.direction.end;
         if own < self.direction.end {
             let step = front.saturating_sub(own);
             let [least, most] = self.steps;
@@ -155,6 +180,19 @@ impl Advance {
         if self.task == Task::Step {
             self.foot.begin(self.step_place(self.station));
         }
+    }
+
+    /// The next front beside a boundary that is a single point. The point is a pass for all stations, or for none: a front through it would leave and enter it
+    /// in a corner. Where it is within a step from some stations only, the front waits for the others half a step before it, from where all around the point is
+    /// cut already.
+    fn before_point(&mut self, own: i32, front: i32) -> i32 {
+        let end = self.direction.end;
+        let half = end.saturating_sub(self.foot.half_step());
+        self.is_covered &= own >= half;
+        if front < end && own < half && self.approach == Approach::Reaches {
+            self.approach = Approach::StopsBefore;
+        }
+        front.min(half).max(own)
     }
 
     /// Stations and the middles between them, in turns.
