@@ -26,6 +26,7 @@ mod machinable;
 mod measure;
 mod outline;
 mod placement;
+mod plane;
 mod reader;
 mod remap;
 mod spline;

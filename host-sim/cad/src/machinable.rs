@@ -2,6 +2,7 @@
 
 use super::exact::exact;
 use super::fit::{Deviation, FitError, Knots, deviation, fit};
+use super::plane::suited;
 use super::spline::SplineSurface;
 use super::surface::Periodic;
 use super::trim::{Polygon, trim};
@@ -147,19 +148,28 @@ pub fn machinable(file: &str, face: &Face, options: &Options) -> Result<Machinab
              surface, wherever the face on it ends",
         ));
     }
+    let suited = if options.untrimmed {
+        None
+    } else {
+        suited(face, &outline)
+    };
+    let (face, outline) = match &suited {
+        Some((face, outline)) => (face, outline),
+        None => (face, &outline),
+    };
     let grown = grown(&face.surface, outline.rectangle, options.around_mm);
-    let made = converted(file, face, options, &outline, grown, &name);
+    let made = converted(file, face, options, outline, grown, &name);
     let (mut made, rectangle) = match made {
         // What is around a face is wanted, the face is needed.
         Err(_) if grown != outline.rectangle => (
-            converted(file, face, options, &outline, outline.rectangle, &name)?,
+            converted(file, face, options, outline, outline.rectangle, &name)?,
             outline.rectangle,
         ),
         made => (made?, grown),
     };
     if !options.untrimmed && (outline.trimmed.is_some() || rectangle != outline.rectangle) {
         let over = (made.form == Form::Exact).then_some(rectangle);
-        let polygons = trim(face, &outline, over, TRIM_MM).map_err(|error| {
+        let polygons = trim(face, outline, over, TRIM_MM).map_err(|error| {
             CadError::face(
                 file,
                 format!("{name}: {}", error.what),

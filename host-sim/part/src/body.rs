@@ -165,6 +165,29 @@ impl Part {
         [self.cells.len(), self.edges.len()]
     }
 
+    /// Points of it, no farther from each other than a step along a cell; of a cell that the trimmed region ends in, those within.
+    pub(crate) fn points(&self, step: f64, each: &mut dyn FnMut(DVec3)) {
+        for cell in &self.cells {
+            let inside = self.inside(cell.face as usize);
+            #[allow(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "at least 0; the cast saturates"
+            )]
+            let [along, across] = cell.sizes().map(|size| (size / step) as usize + 1);
+            for (i, j) in (0..=along).flat_map(|i| (0..=across).map(move |j| (i, j))) {
+                let share = [i as f64 / along as f64, j as f64 / across as f64];
+                let uv = std::array::from_fn(|k| cell.uv[k][0] + share[k] * (cell.uv[k][1] - cell.uv[k][0]));
+                if !cell.is_cut || inside.contains(uv) {
+                    each(cell.at(share));
+                }
+            }
+        }
+        self.edges
+            .iter()
+            .for_each(|(ends, _)| ends.iter().for_each(|end| each(*end)));
+    }
+
     /// The box around it.
     #[must_use]
     pub fn block(&self) -> Block {

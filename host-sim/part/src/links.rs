@@ -122,7 +122,7 @@ pub fn ways(
 }
 
 /// Where a tool is clear of a part.
-pub struct Crossings<'a> {
+struct Crossings<'a> {
     part: &'a Part,
     tool: Tool,
     /// How deep the tool may enter, mm.
@@ -263,8 +263,7 @@ impl<'a> Links<'a> {
 
 impl<'a> Crossings<'a> {
     /// Of a part that the tool may enter as deep as its regions permit.
-    #[must_use]
-    pub fn new(part: &'a Part, tool: &Tool, tolerance_mm: f64, safe_mm: f64) -> Self {
+    fn new(part: &'a Part, tool: &Tool, tolerance_mm: f64, safe_mm: f64) -> Self {
         Self {
             part,
             tool: tool.wide(),
@@ -273,18 +272,11 @@ impl<'a> Crossings<'a> {
         }
     }
 
-    /// The least height of a way between two places where nothing is in between, mm.
-    #[must_use]
-    pub fn least_height(&self, [from, to]: [DVec3; 2]) -> f64 {
-        (from.z.max(to.z) + LIFT_MM).min(self.safe_mm)
-    }
-
     /// The least height at which the tool crosses, mm, at most the safe height.
-    #[must_use]
-    pub fn height(&self, [from, to]: [DVec3; 2]) -> f64 {
+    fn height(&self, [from, to]: [DVec3; 2]) -> f64 {
         let at = |z: f64| [from, to].map(|end| DVec3::new(end.x, end.y, z));
         let is_clear = |z: f64| self.is_clear(at(z), STRIDE_MM);
-        let least = self.least_height([from, to]);
+        let least = from.z.max(to.z) + LIFT_MM;
         if least >= self.safe_mm {
             return self.safe_mm;
         }

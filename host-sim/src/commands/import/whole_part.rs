@@ -20,7 +20,7 @@ use super::Arguments;
 use cad::{CadError, Face, MachinableFace, Model, Options, machinable_once};
 use face::{Asked, Outcome, outcome};
 use order::Links;
-use part::{Crossings, Times, Tool};
+use part::{HeightMap, Times, Tool};
 use picture::{cells, page};
 use program::program;
 pub(super) use setup::Up;
@@ -176,13 +176,13 @@ fn ordered(arguments: &Arguments, setup: &Setup, outcomes: &[Outcome]) -> (Vec<u
         .filter(|index| outcomes[*index].region.is_some())
         .collect();
     let radius_mm = arguments.radius_mm.unwrap_or(0.0);
-    let tool = Tool::new(radius_mm, &job::ToolBody::default());
     let home_mm = setup.home_mm(radius_mm);
     let feed_mm_s = arguments.feed_mm_min.unwrap_or(cad::FEED_MM_MIN) / 60.0;
+    let ends_mm: Vec<_> = with_job.iter().map(|index| outcomes[*index].ends_mm).collect();
     let links = Links::new(
-        Crossings::new(&setup.part, &tool, job_file::PART_TOLERANCE_MM, home_mm.z),
-        Times::new(feed_mm_s, job::AxisLimits::DEFAULT),
-        with_job.iter().map(|index| outcomes[*index].ends_mm),
+        &HeightMap::new(&setup.part, radius_mm),
+        &Times::new(feed_mm_s, job::AxisLimits::DEFAULT),
+        &ends_mm,
         home_mm,
     );
     let order = links.order();

@@ -1,14 +1,8 @@
 //! The order of the faces: the one whose links take least time. From home to the nearest face, from its end to the nearest start, and so on; then faces are moved and runs of faces are
-//! turned round as long as that saves time.
-//!
-//! A link between faces is as high as the part requires, by the exact distance, and that takes milliseconds. So a link is looked at only if it would save time at the least height that it
-//! could have.
-
-use std::cell::RefCell;
-use std::collections::HashMap;
+//! turned round as long as that saves time. The links themselves are made when the job is read, by exact distances.
 
 use glam::DVec3;
-use part::{Crossings, Times};
+use part::{HeightMap, Times};
 
 /// Rounds of the improvement, at most.
 const ROUNDS: usize = 20;
@@ -18,58 +12,32 @@ const MOVED: usize = 3;
 const SAVED_S: f64 = 1e-6;
 
 /// The links between the faces of a part. A face is its index, home the index behind the last one.
-pub(super) struct Links<'a> {
-    crossings: Crossings<'a>,
-    times: Times,
-    /// Where the passes of a face start and end, the ball's centre, mm; home last.
-    ends_mm: Vec<[DVec3; 2]>,
-    home_mm: DVec3,
-    known: RefCell<HashMap<[usize; 2], f64>>,
+pub(super) struct Links {
+    faces: usize,
+    /// From the face of the row to that of the column, s.
+    times_s: Vec<f64>,
 }
 
-impl<'a> Links<'a> {
-    pub(super) fn new(
-        crossings: Crossings<'a>,
-        times: Times,
-        faces_mm: impl IntoIterator<Item = [DVec3; 2]>,
-        home_mm: DVec3,
-    ) -> Self {
+impl Links {
+    /// Between faces whose passes start and end here, the ball's centre, mm.
+    pub(super) fn new(heights: &HeightMap, times: &Times, faces_mm: &[[DVec3; 2]], home_mm: DVec3) -> Self {
+        let ends: Vec<[DVec3; 2]> = faces_mm.iter().copied().chain([[home_mm; 2]]).collect();
+        let pairs = ends
+            .iter()
+            .flat_map(|from| ends.iter().map(move |to| [from[1], to[0]]));
+        let time = |link| times.across(link, heights.over(link).min(home_mm.z));
         Self {
-            crossings,
-            times,
-            ends_mm: faces_mm.into_iter().chain([[home_mm; 2]]).collect(),
-            home_mm,
-            known: RefCell::default(),
+            faces: faces_mm.len(),
+            times_s: pairs.map(time).collect(),
         }
     }
 
-    fn home(&self) -> usize {
-        self.ends_mm.len() - 1
+    const fn home(&self) -> usize {
+        self.faces
     }
 
-    fn ends(&self, [from, to]: [usize; 2]) -> [DVec3; 2] {
-        [self.ends_mm[from][1], self.ends_mm[to][0]]
-    }
-
-    /// The time of a link at the least height that it could have, s.
-    fn least_s(&self, link: [usize; 2]) -> f64 {
-        let ends = self.ends(link);
-        let height = match link.contains(&self.home()) {
-            true => self.home_mm.z,
-            false => self.crossings.least_height(ends),
-        };
-        self.times.across(ends, height)
-    }
-
-    /// The time of a link, s.
-    fn time_s(&self, link: [usize; 2]) -> f64 {
-        if link.contains(&self.home()) {
-            return self.least_s(link);
-        }
-        *self.known.borrow_mut().entry(link).or_insert_with(|| {
-            let ends = self.ends(link);
-            self.times.across(ends, self.crossings.height(ends))
-        })
+    fn time_s(&self, from: usize, to: usize) -> f64 {
+        self.times_s[from * (self.faces + 1) + to]
     }
 
     /// The time of all links of an order, from home and back, s.
@@ -79,13 +47,9 @@ impl<'a> Links<'a> {
 
     /// The time of the links from a face through others to a third, s.
     fn way_s(&self, from: usize, through: &[usize], to: usize) -> f64 {
-        links(from, through, to).map(|link| self.time_s(link)).sum()
-    }
-
-    /// Whether a way takes less time than another; and how much, s.
-    fn saves(&self, from: usize, through: &[usize], to: usize, than_s: f64) -> bool {
-        let least: f64 = links(from, through, to).map(|link| self.least_s(link)).sum();
-        least + SAVED_S < than_s && self.way_s(from, through, to) + SAVED_S < than_s
+        let before = std::iter::once(from).chain(through.iter().copied());
+        let behind = through.iter().copied().chain([to]);
+        before.zip(behind).map(|(from, to)| self.time_s(from, to)).sum()
     }
 
     /// The order of all faces.
@@ -101,34 +65,22 @@ impl<'a> Links<'a> {
 
     /// From home always to the nearest start.
     fn nearest(&self) -> Vec<usize> {
-        let mut left: Vec<usize> = (0..self.home()).collect();
+        let mut left: Vec<usize> = (0..self.faces).collect();
         let mut order = Vec::with_capacity(left.len());
         let mut at = self.home();
-        while !left.is_empty() {
-            let mut by_least: Vec<(f64, usize)> = left
-                .iter()
-                .map(|face| (self.least_s([at, *face]), *face))
-                .collect();
-            by_least.sort_by(|a, b| a.0.total_cmp(&b.0));
-            let mut best = (f64::INFINITY, at);
-            for (least, face) in by_least {
-                if least >= best.0 {
-                    break;
-                }
-                let time = self.time_s([at, face]);
-                if time < best.0 {
-                    best = (time, face);
-                }
-            }
-            at = best.1;
-            left.retain(|face| *face != at);
+        let nearest = |at: usize, left: &[usize]| {
+            let to = |face: &usize| self.time_s(at, *face);
+            (0..left.len()).min_by(|a, b| to(&left[*a]).total_cmp(&to(&left[*b])))
+        };
+        while let Some(place) = nearest(at, &left) {
+            at = left.remove(place);
             order.push(at);
         }
         order
     }
 
     /// One round: every run of faces turned round (2-opt), and a few moved elsewhere (or-opt). Returns whether anything was changed.
-    fn improve(&self, order: &mut Vec<usize>) -> bool {
+    fn improve(&self, order: &mut [usize]) -> bool {
         let mut is_better = false;
         for from in 0..order.len() {
             for to in from + 2..=order.len() {
@@ -143,74 +95,67 @@ impl<'a> Links<'a> {
         is_better
     }
 
-    /// The face before a place in the order, and the one at it.
-    fn around(&self, order: &[usize], from: usize, to: usize) -> [usize; 2] {
-        let before = from.checked_sub(1).map_or(self.home(), |before| order[before]);
-        [before, order.get(to).copied().unwrap_or(self.home())]
-    }
-
     fn turn_round(&self, order: &mut [usize], from: usize, to: usize) -> bool {
-        let [before, behind] = self.around(order, from, to);
-        let now_s = self.way_s(before, &order[from..to], behind);
-        let turned: Vec<usize> = order[from..to].iter().rev().copied().collect();
-        let saves = self.saves(before, &turned, behind, now_s);
-        if saves {
-            order[from..to].copy_from_slice(&turned);
-        }
-        saves
+        self.replace(order, from, to, <[usize]>::reverse)
     }
 
     /// Moves some faces to another place of the order without them.
-    fn shift(&self, order: &mut Vec<usize>, from: usize, count: usize, place: usize) -> bool {
-        if from == place {
-            return false;
-        }
+    fn shift(&self, order: &mut [usize], from: usize, count: usize, place: usize) -> bool {
         // Only what is between the old place and the new one changes.
         let (low, high) = (from.min(place), from.max(place) + count);
-        let [before, behind] = self.around(order, low, high);
-        let now = &order[low..high];
-        let mut moved = now.to_vec();
-        if from < place {
-            moved.rotate_left(count);
-        } else {
-            moved.rotate_right(count);
-        }
-        let now_s = self.way_s(before, now, behind);
-        let saves = self.saves(before, &moved, behind, now_s);
+        self.replace(order, low, high, |moved| {
+            if from < place {
+                moved.rotate_left(count);
+            } else {
+                moved.rotate_right(count);
+            }
+        })
+    }
+
+    /// Changes a part of an order where that saves time.
+    fn replace(
+        &self,
+        order: &mut [usize],
+        from: usize,
+        to: usize,
+        change: impl FnOnce(&mut [usize]),
+    ) -> bool {
+        let before = from.checked_sub(1).map_or(self.home(), |before| order[before]);
+        let behind = order.get(to).copied().unwrap_or(self.home());
+        let now = &mut order[from..to];
+        let mut new = now.to_vec();
+        change(&mut new);
+        let saves = self.way_s(before, &new, behind) + SAVED_S < self.way_s(before, now, behind);
         if saves {
-            order.splice(low..high, moved);
+            now.copy_from_slice(&new);
         }
         saves
     }
-}
-
-/// The links of a way.
-fn links(from: usize, through: &[usize], to: usize) -> impl Iterator<Item = [usize; 2]> {
-    let before = std::iter::once(from).chain(through.iter().copied());
-    let behind = through.iter().copied().chain([to]);
-    before.zip(behind).map(|(from, to)| [from, to])
 }
 
 #[cfg(test)]
 mod tests {
     use super::Links;
     use glam::DVec3;
-    use job::{AxisLimits, ToolBody};
-    use part::{Crossings, Part, Times, Tool};
+    use job::AxisLimits;
+    use part::{HeightMap, Part, Times};
 
     const SAFE_MM: f64 = 30.0;
 
-    fn with_links<T>(faces_mm: &[[DVec3; 2]], take: impl FnOnce(&Links<'_>) -> T) -> T {
-        let part = Part::default();
-        let tool = Tool::new(3.0, &ToolBody::default());
-        let crossings = Crossings::new(&part, &tool, 0.002, SAFE_MM);
+    /// Faces of a plane that is as large as they need.
+    fn links(faces_mm: &[[DVec3; 2]]) -> Links {
+        let text = "[surface]\nkind = \"nurbs\"\ndegree = [1, 1]\nknots_u = [0, 0, 1, 1]\nknots_v = [0, 0, 1, 1]\n\
+            poles_mm = [[[0, 0, -3], [0, 100, -3]], [[100, 0, -3], [100, 100, -3]]]\n\
+            [tool]\nkind = \"ball\"\nradius_mm = 3\n[cut]\nfeed_mm_min = 1200\nscallop_mm = 0.01\nalong = \"u\"\nside = \"up\"\n";
+        let job = job_file::parse("plane.toml", text).unwrap();
+        let plane = Part::of_surface(&oracle::Surface::new(&job.surface));
         let times = Times::new(20.0, AxisLimits::DEFAULT);
-        take(&Links::new(
-            crossings,
-            times,
-            faces_mm.iter().copied(),
+        Links::new(
+            &HeightMap::new(&plane, 3.0),
+            &times,
+            faces_mm,
             DVec3::new(0.0, 0.0, SAFE_MM),
-        ))
+        )
     }
 
     /// Every order of these faces.
@@ -233,7 +178,7 @@ mod tests {
     fn a_row_is_machined_from_one_end_to_the_other() {
         let face = |x: f64| [DVec3::new(x, 0.0, 0.0), DVec3::new(x + 5.0, 0.0, 0.0)];
         let faces = [10.0, 60.0, 20.0, 50.0, 30.0, 40.0].map(face);
-        assert_eq!(with_links(&faces, |links| links.order()), [0, 2, 4, 5, 3, 1]);
+        assert_eq!(links(&faces).order(), [0, 2, 4, 5, 3, 1]);
     }
 
     #[test]
@@ -252,16 +197,15 @@ mod tests {
                     [start, start + DVec3::new(random(15.0), random(15.0), 0.0)]
                 })
                 .collect();
-            with_links(&faces, |links| {
-                let all = orders(&[0, 1, 2, 3, 4, 5]);
-                let best = all
-                    .iter()
-                    .map(|order| links.sum_s(order))
-                    .fold(f64::INFINITY, f64::min);
-                let found = links.sum_s(&links.order());
-                assert!(found <= links.sum_s(&links.nearest()), "{case}");
-                assert!(found <= 1.05 * best, "{case}: {found} {best}");
-            });
+            let links = links(&faces);
+            let all = orders(&[0, 1, 2, 3, 4, 5]);
+            let best = all
+                .iter()
+                .map(|order| links.sum_s(order))
+                .fold(f64::INFINITY, f64::min);
+            let found = links.sum_s(&links.order());
+            assert!(found <= links.sum_s(&links.nearest()), "{case}");
+            assert!(found <= 1.05 * best, "{case}: {found} {best}");
         }
     }
 }
