@@ -14,6 +14,11 @@ const RADIUS_MAX_MM: f64 = 1e4;
 /// Least length of the projection of a unit tangent into a plane; a steeper path has no usable direction in that plane.
 const STEEP: f64 = 1e-3;
 
+/// Bisections for the joint of two arcs between two nodes.
+const BISECTIONS: u32 = 40;
+/// Rounding of the place of a node along a piece, mm.
+const ROUNDED_MM: f64 = 1e-7;
+
 type Flat = [f64; 2];
 
 fn minus(a: Flat, b: Flat) -> Flat {
@@ -148,21 +153,38 @@ impl Arcs {
         let tangents = [tangent(first, plane)?, tangent(last, plane)?];
         let pieces = biarc([place(first), place(last)], tangents)?;
         let flat = pieces.map(|piece| piece.length());
-        // The joint is within the tolerance of the path: its foot is searched across the chord.
-        let chord = minus(place(last), place(first));
-        let ahead = |node: &Node| inner(chord, minus(place(node), pieces[0].to));
+        // The joint is within the tolerance of the path: its foot is searched.
+        let ahead = |node: &Node| {
+            inner(
+                [node.tangent[x], node.tangent[y]],
+                minus(place(node), pieces[0].to),
+            )
+        };
         let split = nodes
             .partition_point(|node| ahead(node) <= 0.0)
             .clamp(1, nodes.len() - 1);
         let (before, after) = (&nodes[split - 1], &nodes[split]);
-        let share = ahead(before) / (ahead(before) - ahead(after));
-        let at_joint = |of: &dyn Fn(&Node) -> f64| of(before) + share * (of(after) - of(before));
+        let between = |values: [f64; 2], rates: [f64; 2], t: f64| {
+            let span = after.cl_length_mm - before.cl_length_mm;
+            hermite(values, rates.map(|rate| rate * span), t)
+        };
+        let t = root(|t| {
+            let places = [x, y].map(|axis| {
+                let values = [before.cl_mm()[axis], after.cl_mm()[axis]];
+                between(values, [before.tangent[axis], after.tangent[axis]], t)
+            });
+            let [off_x, off_y] = [0, 1].map(|axis| places[axis][0] - pieces[0].to[axis]);
+            off_x * places[0][1] + off_y * places[1][1]
+        });
+        let at_joint = |value: &dyn Fn(&Node) -> f64, rate: &dyn Fn(&Node) -> f64| {
+            between([value(before), value(after)], [rate(before), rate(after)], t)[0]
+        };
         let heights = [
             first.cl_mm()[across],
-            at_joint(&|node| node.cl_mm()[across]),
+            at_joint(&|node| node.cl_mm()[across], &|node| node.tangent[across]),
             last.cl_mm()[across],
         ];
-        let contact = at_joint(&|node| node.cc_length_mm) - first.cc_length_mm;
+        let contact = at_joint(&|node| node.cc_length_mm, &|node| 1.0 / node.at.ratio()) - first.cc_length_mm;
         let contacts = [contact, last.cc_length_mm - first.cc_length_mm - contact];
         let lift = |[at_x, at_y]: Flat, height: f64| {
             let mut point = DVec3::splat(height);
@@ -183,17 +205,55 @@ impl Arcs {
             }
         });
         let holds = |k: usize, nodes: &[Node]| {
+            // Between the nodes the path may be farther off than at them: by 1/n^2 of a parabola, and by twice that of what is bent more in its middle.
+            let intervals = nodes.len().max(2) as f64;
+            let path_mm = self.path_mm * (1.0 - 2.0 / (intervals * intervals));
+            let begin = if k == 0 { 0.0 } else { contact };
+            let rate = cuts[k].length_mm / cuts[k].speed_mm_s * self.feed_mm_s;
+            let mut last = [0.0; 2];
+            let mut holds_feed = |share: f64, contact: f64| {
+                // Beside the path the contact is faster or slower, where that bends: its way since the last node, against that at the feed.
+                let (way, wanted) = (contact - last[1], rate * (share - last[0]));
+                last = [share, contact];
+                (way - wanted).abs() <= SPEED_SHARE * wanted + ROUNDED_MM
+            };
             nodes.iter().all(|node| {
                 let (off, share) = pieces[k].distance(place(node));
                 let beside = heights[k] + share * (heights[k + 1] - heights[k]) - node.cl_mm()[across];
-                // The relative feed error of the contact equals the relative speed error of the centre.
+                // On the path itself the relative feed error of the contact equals that of the centre's speed.
                 let wanted = self.feed_mm_s * node.at.ratio();
                 let slow = cuts[k].speed_mm_s - wanted;
-                off.hypot(beside) <= self.path_mm && slow.abs() <= SPEED_SHARE * wanted
-            })
+                off.hypot(beside) <= path_mm
+                    && slow.abs() <= SPEED_SHARE * wanted
+                    && holds_feed(share, node.cc_length_mm - first.cc_length_mm - begin)
+            }) && holds_feed(1.0, contacts[k])
         };
         (holds(0, &nodes[..split]) && holds(1, &nodes[split..])).then_some(cuts)
     }
+}
+
+/// The cubic with these values and derivatives at 0 and 1, and its derivative.
+fn hermite([from, to]: [f64; 2], [begin, end]: [f64; 2], t: f64) -> [f64; 2] {
+    let rise = to - from;
+    let (square, cube) = (3.0 * rise - 2.0 * begin - end, begin + end - 2.0 * rise);
+    [
+        from + t * (begin + t * (square + t * cube)),
+        begin + t * (2.0 * square + t * 3.0 * cube),
+    ]
+}
+
+/// The place between 0 and 1 at which a rising function is 0.
+fn root(of: impl Fn(f64) -> f64) -> f64 {
+    let (mut low, mut high) = (0.0, 1.0);
+    for _ in 0..BISECTIONS {
+        let middle = 0.5 * (low + high);
+        if of(middle) < 0.0 {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    0.5 * (low + high)
 }
 
 /// Unit tangent in a plane; `None` if the path is too steep to it.

@@ -38,7 +38,7 @@ pub use measure::{Measured, measure, measure_run};
 pub use nodes::{Node, Nodes};
 pub use pass::PassPath;
 pub(crate) use pass::from_segment;
-pub use run::{Motion, Planned, curved_passes, passes, planned, run};
+pub use run::{Motion, Planned, job_passes, passes, planned, run};
 pub use side_curve::{SideCurve, side_curves};
 
 use job::Job;

@@ -2,7 +2,7 @@
 
 use crate::SideCurve;
 use glam::DVec3;
-use oracle::{OffsetPoint, Oracle, OracleError};
+use oracle::{OffsetPoint, Oracle, OracleError, foot_on};
 
 /// One pass of a job.
 #[derive(Clone, Copy, Debug)]
@@ -46,6 +46,14 @@ impl PassPath<'_> {
         self.curve.map_or(self.side, |curve| curve.at(path)[0])
     }
 
+    /// The point of the pass nearest to a commanded centre close to it; `guess`: a path parameter near it.
+    ///
+    /// # Errors
+    /// As [`Oracle::offset`].
+    pub fn foot(&self, cl_mm: DVec3, guess: f64) -> Result<OffsetPoint, OracleError> {
+        foot_on(cl_mm, guess, self.range(), |path| self.at(path))
+    }
+
     /// Path parameters between which it is smooth, in the order of travel.
     #[must_use]
     pub fn breaks(&self) -> Vec<f64> {
@@ -70,11 +78,16 @@ impl PassPath<'_> {
     /// The parameter, clamped to the pass.
     #[must_use]
     pub fn kept(&self, path: f64) -> f64 {
-        let [low, high] = match self.curve {
+        let [low, high] = self.range();
+        path.clamp(low, high)
+    }
+
+    /// Path parameters for which the pass is defined, ascending.
+    fn range(&self) -> [f64; 2] {
+        match self.curve {
             Some(_) => [self.ends[0].min(self.ends[1]), self.ends[0].max(self.ends[1])],
             None => self.oracle.path_range(),
-        };
-        path.clamp(low, high)
+        }
     }
 
     /// Whether the pass is degenerate (one point).

@@ -1,6 +1,6 @@
 //! Runs an approach over a whole job.
 
-use crate::{Approach, ApproachError, Kind, PassPath, SideCurve};
+use crate::{Approach, ApproachError, Kind, PassPath, SideCurve, side_curves};
 use glam::DVec3;
 use inspect::plain;
 use job::{Job, Pattern};
@@ -17,7 +17,7 @@ pub struct Motion {
     pub emitted: PassSample,
     /// Path parameter of the contact.
     pub path: f64,
-    /// Side parameter of the pass.
+    /// Side parameter of the contact.
     pub side: f64,
     /// CL, mm; rounded only for the product.
     pub cl_mm: DVec3,
@@ -36,7 +36,18 @@ pub struct Planned {
     pub speed_step_mm_s: f64,
 }
 
-/// The passes of a job, by the dense scan of the oracle.
+/// The passes of a job: those on `curves` where there are any, of [`crate::side_curves`], straight ones else.
+///
+/// # Errors
+/// As [`passes`].
+pub fn job_passes<'a>(oracle: &'a Oracle, curves: &'a [SideCurve]) -> Result<Vec<PassPath<'a>>, OracleError> {
+    if curves.is_empty() {
+        return passes(oracle);
+    }
+    Ok(curved_passes(oracle, curves))
+}
+
+/// Straight passes of a job, by the dense scan of the oracle.
 ///
 /// # Errors
 /// As [`Oracle::schedule`].
@@ -62,9 +73,8 @@ pub fn passes<'a>(oracle: &'a Oracle) -> Result<Vec<PassPath<'a>>, OracleError> 
         .collect())
 }
 
-/// The passes of a job of constant scallop height, on curves of [`crate::side_curves`].
-#[must_use]
-pub fn curved_passes<'a>(oracle: &'a Oracle, curves: &'a [SideCurve]) -> Vec<PassPath<'a>> {
+/// The passes on curves.
+fn curved_passes<'a>(oracle: &'a Oracle, curves: &'a [SideCurve]) -> Vec<PassPath<'a>> {
     let pass = |(index, curve): (usize, &'a SideCurve)| {
         let ends = curve.ends();
         PassPath {
@@ -86,7 +96,8 @@ pub fn run(kind: Kind, job: &Job, each: &mut dyn FnMut(&Motion)) -> Result<Plann
     match kind.plan_for(job) {
         Some(approach) => {
             let oracle = Oracle::new(job)?;
-            planned(approach.as_ref(), job, &passes(&oracle)?, each)
+            let curves = side_curves(job)?;
+            planned(approach.as_ref(), job, &job_passes(&oracle, &curves)?, each)
         }
         None => on_the_core(job, each),
     }
@@ -133,7 +144,7 @@ pub fn planned(
             let next = motion(pass, begin, pass.ends[1], 0.0)?;
             send(std::mem::replace(&mut pending, next));
         }
-        let (u, v) = pass.oracle.swapped(pass.ends[1], pass.side);
+        let (u, v) = pass.oracle.swapped(pass.ends[1], pass.side_at(pass.ends[1]));
         (pending.path, pending.emitted.u, pending.emitted.v) = (pass.ends[1], u, v);
         pending.emitted.last_of_pass = true;
         send(pending);
@@ -147,8 +158,9 @@ fn nanometres(mm: DVec3) -> [i32; 3] {
 
 /// The motion to a commanded CL.
 fn motion(pass: &PassPath<'_>, cl_mm: DVec3, guess: f64, feed_mm_s: f64) -> Result<Motion, OracleError> {
-    let foot = pass.oracle.foot(cl_mm, guess, pass.side)?;
-    let (u, v) = pass.oracle.swapped(foot.path, pass.side);
+    let foot = pass.foot(cl_mm, guess)?;
+    let side = pass.side_at(foot.path);
+    let (u, v) = pass.oracle.swapped(foot.path, side);
     Ok(Motion {
         emitted: PassSample {
             tick: 0,
@@ -163,7 +175,7 @@ fn motion(pass: &PassPath<'_>, cl_mm: DVec3, guess: f64, feed_mm_s: f64) -> Resu
             last_of_pass: false,
         },
         path: foot.path,
-        side: pass.side,
+        side,
         cl_mm,
     })
 }

@@ -40,7 +40,7 @@ mod verify;
 pub use contact::{Contact, Oracle, OracleError};
 pub use derivatives::Derivatives;
 pub use facing::{Facing, facing, turned_further};
-pub use offset::OffsetPoint;
+pub use offset::{OffsetPoint, foot_on};
 pub use region::RegionEdges;
 pub use report::{AccuracyBounds, AccuracyFigure, AccuracyReport, ErrorStatistics, SampleLocation};
 pub use schedule::ScheduledPass;

@@ -8,6 +8,11 @@ use job::Along;
 
 /// Step into the surface at which derivatives at a pole are evaluated, as a share of the range.
 const INWARDS: f64 = 1e-6;
+/// Below this share of the other one, each times its range, a first derivative is near a pole, where the derivative of the centre along a curve is
+/// extrapolated: the curve's slope multiplies the quotients that vanish there.
+const NEAR_POLE_SHARE: f64 = 1e-5;
+/// Steps of that extrapolation, as a share of the range: three of them leave a relative error near 1e-8.
+const POLE_STEP: f64 = 1e-3;
 /// Distance from a break, as a share of the range, at which the two sides are compared: a continuous ratio
 /// changes by less than a relative 1e-9 between them.
 const BESIDE: f64 = 1e-10;
@@ -71,29 +76,74 @@ impl Oracle {
         let (u, v) = self.swapped(path, side);
         let at = self.surface.at(u, v);
         let mut contact = self.contact_of(&at, u, v)?;
-        let (a, b, aa, bb) = match self.along {
-            Along::U => (at.u, at.v, at.uu, at.vv),
-            Along::V => (at.v, at.u, at.vv, at.uu),
-        };
-        let tangent = a + b * slope;
-        contact.path_speed = tangent.length();
-        let (e, f, g) = (a.length_squared(), a.dot(b), b.length_squared());
-        let determinant = a.cross(b).length_squared();
-        // The second fundamental form of the tangent with A and with B.
-        let mixed = at.uv.dot(contact.normal);
-        let l = aa.dot(contact.normal) + slope * mixed;
-        let m = mixed + slope * bb.dot(contact.normal);
-        let turned = a * (g * l - f * m) + b * (e * m - f * l);
-        let cl_velocity = if determinant > 1e-18 * e * g {
-            tangent - turned * (self.radius_mm / determinant)
+        let (a, b) = self.along_and_across(&at);
+        contact.path_speed = (a + b * slope).length();
+        let [length, width] = [self.path_range(), self.side_range()].map(|[low, high]| high - low);
+        let (along, across) = (a.length() * length, b.length() * width);
+        let cl_velocity = if along.min(across) > NEAR_POLE_SHARE * along.max(across) {
+            self.curve_velocity(&at, contact.normal, slope)
         } else {
-            self.velocity_beside(path, side).unwrap_or_default()
+            self.velocity_near_pole(path, side, slope, along < across)?
         };
         Ok(OffsetPoint {
             path,
             contact,
             cl_velocity,
         })
+    }
+
+    fn along_and_across(&self, at: &Derivatives) -> (DVec3, DVec3) {
+        match self.along {
+            Along::U => (at.u, at.v),
+            Along::V => (at.v, at.u),
+        }
+    }
+
+    /// Derivative of the centre on a curve of this slope, away from poles.
+    fn curve_velocity(&self, at: &Derivatives, normal: DVec3, slope: f64) -> DVec3 {
+        let (a, b) = self.along_and_across(at);
+        let (aa, bb) = match self.along {
+            Along::U => (at.uu, at.vv),
+            Along::V => (at.vv, at.uu),
+        };
+        let (e, f, g) = (a.length_squared(), a.dot(b), b.length_squared());
+        // The second fundamental form of the tangent with A and with B.
+        let mixed = at.uv.dot(normal);
+        let l = aa.dot(normal) + slope * mixed;
+        let m = mixed + slope * bb.dot(normal);
+        let turned = a * (g * l - f * m) + b * (e * m - f * l);
+        a + b * slope - turned * (self.radius_mm / a.cross(b).length_squared())
+    }
+
+    /// The same near a pole, extrapolated from three places on the curve; `beside`: the pole is beside the passes.
+    fn velocity_near_pole(
+        &self,
+        path: f64,
+        side: f64,
+        slope: f64,
+        beside: bool,
+    ) -> Result<DVec3, OracleError> {
+        let (t, [low, high]) = match beside {
+            true => (side, self.side_range()),
+            false => (path, self.path_range()),
+        };
+        let step = POLE_STEP
+            * if t - low <= high - t {
+                high - low
+            } else {
+                low - high
+            };
+        let velocity = |steps: f64| {
+            let (path, side) = match beside {
+                true => (path, side + steps * step),
+                false => (path + steps * step, side + steps * step * slope),
+            };
+            let (u, v) = self.swapped(path, side);
+            let at = self.surface.at(u, v);
+            let normal = self.contact_of(&at, u, v)?.normal;
+            Ok(self.curve_velocity(&at, normal, slope))
+        };
+        Ok((velocity(1.0)? - velocity(2.0)?) * 3.0 + velocity(3.0)?)
     }
 
     /// `A + r N_A` by the Weingarten equations; `None` where the derivatives do not span the tangent plane.
@@ -156,21 +206,33 @@ impl Oracle {
     /// # Errors
     /// As [`Oracle::offset`].
     pub fn foot(&self, cl_mm: DVec3, guess: f64, side: f64) -> Result<OffsetPoint, OracleError> {
-        let [low, high] = self.path_range();
-        let mut at = self.offset(guess.clamp(low, high), side)?;
-        for _ in 0..FOOT_STEPS {
-            let squared = at.cl_velocity.length_squared();
-            if squared <= 0.0 {
-                break;
-            }
-            let by = (cl_mm - at.contact.cl_mm).dot(at.cl_velocity) / squared;
-            let next = (at.path + by).clamp(low, high);
-            let moved = (next - at.path).abs();
-            at = self.offset(next, side)?;
-            if moved <= FOOT_TOLERANCE * (high - low) {
-                break;
-            }
-        }
-        Ok(at)
+        foot_on(cl_mm, guess, self.path_range(), |path| self.offset(path, side))
     }
+}
+
+/// The same on any path between two path parameters.
+///
+/// # Errors
+/// Those of `offset`.
+pub fn foot_on(
+    cl_mm: DVec3,
+    guess: f64,
+    [low, high]: [f64; 2],
+    offset: impl Fn(f64) -> Result<OffsetPoint, OracleError>,
+) -> Result<OffsetPoint, OracleError> {
+    let mut at = offset(guess.clamp(low, high))?;
+    for _ in 0..FOOT_STEPS {
+        let squared = at.cl_velocity.length_squared();
+        if squared <= 0.0 {
+            break;
+        }
+        let by = (cl_mm - at.contact.cl_mm).dot(at.cl_velocity) / squared;
+        let next = (at.path + by).clamp(low, high);
+        let moved = (next - at.path).abs();
+        at = offset(next)?;
+        if moved <= FOOT_TOLERANCE * (high - low) {
+            break;
+        }
+    }
+    Ok(at)
 }

@@ -3,9 +3,16 @@
 use super::outcome::Outcome;
 use super::simulate::WantedReport;
 use super::{Result, WantedTrace, begun, completed, progress, spinner, unheld_limits};
-use approach::{Kind, measure};
+use approach::{ApproachError, Kind, job_passes, measure, side_curves};
 use job::Job;
+use oracle::Oracle;
 use report::{Remarks, Sketch};
+
+fn count_passes(job: &Job) -> std::result::Result<usize, ApproachError> {
+    let oracle = Oracle::new(job)?;
+    let curves = side_curves(job)?;
+    Ok(job_passes(&oracle, &curves)?.len())
+}
 
 pub(super) fn command(
     kind: Kind,
@@ -14,16 +21,14 @@ pub(super) fn command(
     directory: Option<WantedReport<'_>>,
     as_json: bool,
 ) -> Result<()> {
-    super::straight_passes(job)?;
+    super::whole_surface(job)?;
     let bar = spinner("computing the passes");
-    let passes = inspect::oracle(job)?
-        .schedule()
-        .map_err(approach::ApproachError::from)?;
+    let passes = count_passes(job)?;
     bar.finish_and_clear();
-    let mut sketch = directory.map(|_| Sketch::new(job, passes.len()).by(kind));
+    let mut sketch = directory.map(|_| Sketch::new(job, passes).by(kind));
     let (mut trace, whole) = begun(wanted, job)?;
     let mut written = Ok(());
-    let bar = progress(passes.len() as u64, "following");
+    let bar = progress(passes as u64, "following");
     let start = std::time::Instant::now();
     let measured = measure(kind, job, |motion, _, checked| {
         let emitted = &motion.emitted;

@@ -336,22 +336,6 @@ fn whole_surface(job: &Job) -> Result<()> {
     Ok(())
 }
 
-/// Refuses passes of constant scallop height, too.
-fn straight_passes(job: &Job) -> Result<()> {
-    whole_surface(job)?;
-    if job.spacing.is_constant() {
-        return Err(job
-            .origin
-            .error(
-                "cut.spacing",
-                "the other approaches have straight passes only",
-                "write spacing = \"exact\"",
-            )
-            .into());
-    }
-    Ok(())
-}
-
 /// A warning of the axis limits that a job sets and that the other approaches do not keep.
 fn unheld_limits(job: &Job) -> Option<String> {
     let machine = &job.machine;

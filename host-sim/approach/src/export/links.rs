@@ -10,6 +10,9 @@ use oracle::{Oracle, OracleError};
 /// Largest number of cuts of a step-over.
 const CUTS_MAX: u32 = 1 << 12;
 
+/// Parts of a cut of a step-over between whose ends its chord error is evaluated.
+const PARTS: u32 = 8;
+
 /// Retract to the safe height.
 pub(super) fn retract(blocks: &mut Blocks<'_>, safe_z_mm: f64) {
     blocks.rapid([None, None, Some(safe_z_mm)]);
@@ -48,15 +51,17 @@ pub(super) fn step_over(
     };
     let [path, side] = from;
     let holds = |count: u32| -> Result<bool, OracleError> {
-        let places: Result<Vec<_>, _> = (0..=2 * count)
-            .map(|k| at(f64::from(k) / f64::from(2 * count)).map(|contact| contact.cl_mm))
+        let places: Result<Vec<_>, _> = (0..=PARTS * count)
+            .map(|k| at(f64::from(k) / f64::from(PARTS * count)).map(|contact| contact.cl_mm))
             .collect();
         let places = places?;
-        // The chord error is largest near the middle.
-        Ok(places
-            .windows(3)
-            .step_by(2)
-            .all(|three| from_segment(three[1], three[0], three[2]) <= job.chord_mm))
+        let most = job.chord_mm * (1.0 - 1.0 / f64::from(PARTS * PARTS));
+        let is_near = |chord: &[DVec3]| {
+            let (from, to) = (chord[0], chord[chord.len() - 1]);
+            chord.iter().all(|place| from_segment(*place, from, to) <= most)
+        };
+        let parts = PARTS as usize;
+        Ok(places.windows(parts + 1).step_by(parts).all(is_near))
     };
     let mut count = 1;
     while !holds(count)? {

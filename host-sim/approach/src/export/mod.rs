@@ -12,9 +12,7 @@
 mod links;
 
 use crate::gcode::{Blocks, Cut, FeedMode};
-use crate::{
-    ApproachError, Arcs, ConstantCl, Kind, Nodes, PassPath, curved_passes, even_chords, passes, side_curves,
-};
+use crate::{ApproachError, Arcs, ConstantCl, Kind, Nodes, PassPath, even_chords, job_passes, side_curves};
 use glam::DVec3;
 use job::{Job, Pattern};
 use oracle::Oracle;
@@ -130,15 +128,8 @@ impl Path {
 pub fn export(job: &Job, options: &Options, done: &dyn Fn()) -> Result<ExportedProgram, ExportError> {
     let oracle = Oracle::new(job)?;
     let mut paths = Vec::new();
-    let curves = match job.spacing.is_constant() {
-        true => side_curves(job)?,
-        false => Vec::new(),
-    };
-    let passes = match job.spacing.is_constant() {
-        true => curved_passes(&oracle, &curves),
-        false => passes(&oracle)?,
-    };
-    for pass in passes {
+    let curves = side_curves(job)?;
+    for pass in job_passes(&oracle, &curves)? {
         paths.push(Path::new(options.kind, job, &pass)?);
         done();
     }
