@@ -269,6 +269,64 @@ fn dome(aside: f64, is_first: bool) -> Job {
     job
 }
 
+/// A fan that is bent both ways, in two spans each way of 5 and 15 mm, with inner knots here.
+fn fan(knot: f64) -> Job {
+    let ends = [[0.0, 5.0], [5.0, 20.0]];
+    let squares: Vec<f64> = ends
+        .iter()
+        .flat_map(|[a, b]| [a * a, a * b])
+        .chain([400.0])
+        .collect();
+    let places: Vec<f64> = ends
+        .iter()
+        .flat_map(|[a, b]| [*a, 0.5 * (a + b)])
+        .chain([20.0])
+        .collect();
+    let pole = |i: usize, j: usize| {
+        let (x, y) = (places[i], places[j]);
+        [
+            x,
+            y * (1.0 + 0.05 * x),
+            -0.01 * squares[i] - 0.006 * squares[j],
+            1.0,
+        ]
+    };
+    let poles_mm = (0..5).map(|i| (0..5).map(|j| pole(i, j)).collect()).collect();
+    let knots = || vec![0.0, 0.0, 0.0, knot, knot, 1.0, 1.0, 1.0];
+    let mut job = plane([[0.0; 2]; 4]);
+    job.surface = SurfaceSpec::Nurbs(NurbsSpec {
+        degree: [2, 2],
+        knots_u: knots(),
+        knots_v: knots(),
+        poles_mm,
+        rational: false,
+    });
+    job
+}
+
+/// A knot at which the parametrisation jumps by one factor, so that the same surface has other parameters: the same passes.
+#[test]
+fn parametrisation_that_jumps() {
+    for start in [Start::Edge, Start::Middle] {
+        let [even, uneven] = [0.25, 0.6].map(|knot| {
+            let mut job = fan(knot);
+            (job.spacing, job.feed_mm_min) = (Spacing::Constant(start), 600.0);
+            let found = follow(&job).findings;
+            let failures = found.report.failures(&oracle::AccuracyBounds::default());
+            assert!(failures.is_empty(), "{start:?}, knot at {knot}: {failures:?}");
+            let (excess, error) = excess(&job, &measured(&job));
+            assert!(
+                excess <= error && error <= ERROR_SHARE_MAX,
+                "{start:?}: {excess} within {error}"
+            );
+            (found.report.passes, found.report.cc_length_mm)
+        });
+        println!("{start:?}: {even:?} {uneven:?}");
+        assert_eq!(even.0, uneven.0);
+        assert!((even.1 - uneven.1).abs() < 2e-4 * even.1, "{even:?} {uneven:?}");
+    }
+}
+
 /// The upper half of a sphere of 6 mm that lies on its side: passes along the parallels, from one point of its axis to the other.
 fn barrel() -> Job {
     let half = std::f64::consts::FRAC_1_SQRT_2;

@@ -21,6 +21,6 @@ pub fn plain(prepared: &Prepared, sample: &interp_core::Sample) -> EmittedSample
         cc_nm: sample.cc_nm,
         cl_nm: sample.cl_nm,
         feed_mm_s: sample.feed_mm_s,
-        interval: sample.interval(),
+        interval: sample.interval() * prepared.side_unit(sample.side.span),
     }
 }

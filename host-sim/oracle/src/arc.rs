@@ -3,6 +3,7 @@
 use job::Along;
 
 use super::contact::Oracle;
+use super::smooth::SmoothParameter;
 
 /// Nodes and weights of the three-point Gauss-Legendre rule on [-1, 1]: ±sqrt(3/5) and 0; 5/9 and 8/9.
 const NODE: f64 = 0.774_596_669_241_483_4;
@@ -66,24 +67,34 @@ impl Oracle {
         sum * half
     }
 
-    /// Arc of the curve whose side parameter is the parabola through three points (path, side), from the second to the third, mm.
-    pub(super) fn arc_of_curve(&self, breaks: &[f64], [before, from, to]: [[f64; 2]; 3]) -> f64 {
+    /// Arc of the curve whose side parameter is the parabola through three points (path, side), from the second to the third, mm, in parameters in which the curve is smooth.
+    pub(super) fn arc_of_curve(
+        &self,
+        breaks: &[f64],
+        [path, side]: &[SmoothParameter; 2],
+        points: [[f64; 2]; 3],
+    ) -> f64 {
+        let [before, from, to] = points.map(|[x, y]| [path.of(x), side.of(y)]);
         let first = (to[1] - from[1]) / (to[0] - from[0]);
         let last = (from[1] - before[1]) / (from[0] - before[0]);
         let second = (first - last) / (to[0] - before[0]);
-        let side = |path: f64| from[1] + (path - from[0]) * (first + second * (path - to[0]));
-        let slope = |path: f64| first + second * (2.0 * path - from[0] - to[0]);
-        let speed = |path: f64| {
-            let (u, v) = self.swapped(path, side(path));
+        let side_at = |x: f64| from[1] + (x - from[0]) * (first + second * (x - to[0]));
+        let slope = |x: f64| first + second * (2.0 * x - from[0] - to[0]);
+        let speed = |x: f64| {
+            let ((path, along_scale), (side, across_scale)) = (path.own(x), side.own(side_at(x)));
+            let (u, v) = self.swapped(path, side);
             let at = self.surface.at(u, v);
             let (along, across) = match self.along {
                 Along::U => (at.u, at.v),
                 Along::V => (at.v, at.u),
             };
-            (along + across * slope(path)).length()
+            (along / along_scale + across * (slope(x) / across_scale)).length()
         };
         let (low, high) = (from[0].min(to[0]), from[0].max(to[0]));
-        let inner = breaks.iter().copied().filter(|knot| low < *knot && *knot < high);
+        let inner = breaks
+            .iter()
+            .map(|knot| path.of(*knot))
+            .filter(|knot| low < *knot && *knot < high);
         let ends: Vec<f64> = [low].into_iter().chain(inner).chain([high]).collect();
         let mut sum = 0.0;
         for part in ends.windows(2) {

@@ -4,6 +4,7 @@ use std::fmt;
 
 use super::derivatives::Derivatives;
 use super::region::RegionEdges;
+use super::smooth::SmoothParameter;
 use super::surface::Surface;
 use glam::DVec3;
 use job::{Along, Job, Pattern, Region, Side, Spacing, Start};
@@ -215,7 +216,7 @@ impl Oracle {
     pub fn outer_passes(&self) -> [f64; 2] {
         let [first, last] = self.side_range();
         match self.spacing {
-            Spacing::Constant(Start::Middle) => [0.5 * (first + last), first],
+            Spacing::Constant(Start::Middle) => [SmoothParameter::new(self, self.across()).middle(), first],
             Spacing::Constant(Start::Edge) if self.is_point(last) && !self.is_point(first) => [last, first],
             _ => [first, last],
         }

@@ -32,6 +32,7 @@ mod offset;
 mod region;
 mod report;
 mod schedule;
+mod smooth;
 mod surface;
 #[cfg(test)]
 mod tests;

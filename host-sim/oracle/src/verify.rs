@@ -2,6 +2,7 @@
 
 use super::contact::Oracle;
 use super::report::{AccuracyReport, SampleLocation};
+use super::smooth::SmoothParameter;
 use glam::DVec3;
 use job::{Pattern, Spacing};
 
@@ -58,6 +59,7 @@ pub struct Verifier {
     cell: Oracle,
     cell_index: usize,
     breaks: Vec<f64>,
+    smooth: [SmoothParameter; 2],
     report: AccuracyReport,
     current: Option<PassState>,
     /// Ends of the passes on the current line of a region.
@@ -97,6 +99,7 @@ impl Verifier {
         };
         Self {
             breaks: oracle.surface.breaks(oracle.along),
+            smooth: [oracle.along, oracle.across()].map(|along| SmoothParameter::new(oracle, along)),
             oracle: oracle.clone(),
             cell: oracle.of_cell(0),
             cell_index: 0,
@@ -408,11 +411,15 @@ impl Verifier {
         let Some(older) = older else {
             // The curve's bend is not known yet.
             let straight = [0, 1].map(|k| 2.0 * last[k] - at[k]);
-            let arc = self.oracle.arc_of_curve(&self.breaks, [straight, last, at]);
+            let arc = self
+                .oracle
+                .arc_of_curve(&self.breaks, &self.smooth, [straight, last, at]);
             self.report.cc_length_mm += arc;
             return (Some(arc), None);
         };
-        let arc = self.oracle.arc_of_curve(&self.breaks, [older, last, at]);
+        let arc = self
+            .oracle
+            .arc_of_curve(&self.breaks, &self.smooth, [older, last, at]);
         self.check_arc(sample, arc, spot)
     }
 

@@ -16,7 +16,7 @@ const CREASE_MAX: f64 = 1e-3;
 /// Radius of a circle that is a point, mm.
 const POINT_MM: f64 = 1e-5;
 
-/// Refuses a crease, too many path spans, and a job for whose stations the store has no room.
+/// Refuses too many path spans, and a job for whose stations the store has no room.
 ///
 /// # Errors
 /// As above.
@@ -25,9 +25,6 @@ pub(super) fn check(job: &Job, prepared: &Prepared) -> Result<(), JobError> {
         return Ok(());
     }
     let no = |what: String, remedy: &str| Err(job.origin.error("cut.spacing", what, remedy));
-    if let Some(crease) = crease(job, prepared) {
-        return no(crease, REMEDY);
-    }
     let Some(words) = front_words(&prepared.header) else {
         return no(
             format!(
@@ -49,39 +46,78 @@ pub(super) fn check(job: &Job, prepared: &Prepared) -> Result<(), JobError> {
     Ok(())
 }
 
-/// A knot at which the surface's first derivatives jump.
-fn crease(job: &Job, prepared: &Prepared) -> Option<String> {
+/// Widths of the spans for which the surface's first derivatives are continuous, so that a front crosses a knot without a bend where only the parametrisation jumps, by one factor
+/// all along the knot.
+///
+/// # Errors
+/// A knot at which there is none: the tangent plane jumps, or the factor is not the same all along.
+pub(super) fn smooth_widths(job: &Job, prepared: &mut Prepared) -> Result<(), JobError> {
+    if !job.spacing.is_constant() {
+        return Ok(());
+    }
     let surface = SurfaceEvaluator::new(&job.surface);
-    let (path, side) = (&prepared.path.breaks, &prepared.side.breaks);
-    let names = match job.along {
-        job::Along::U => ["u", "v"],
-        job::Along::V => ["v", "u"],
+    let other = |along| match along {
+        job::Along::U => job::Along::V,
+        job::Along::V => job::Along::U,
     };
-    for (name, knots, across) in [(names[0], path, side), (names[1], side, path)] {
-        let [low, high] = [across[0], across[across.len() - 1]];
-        let width = knots[knots.len() - 1] - knots[0];
-        for knot in &knots[1..knots.len() - 1] {
-            for k in 0..CREASE_POINTS {
-                let at = low + (high - low) * (f64::from(k) + 0.5) / f64::from(CREASE_POINTS);
-                let sides = [-CREASE_STEP, CREASE_STEP].map(|step| {
-                    let moved = knot + step * width;
-                    let frame = if name == "u" {
-                        surface.at(moved, at)
-                    } else {
-                        surface.at(at, moved)
-                    };
-                    if name == "u" { frame.u } else { frame.v }
-                });
-                let [before, after] = sides;
-                if before.distance(after) > CREASE_MAX * before.length().max(after.length()) {
-                    return Some(format!(
-                        "passes of constant scallop height need a smooth parametrisation, but its derivative along {name} jumps at {name} = {knot}"
-                    ));
-                }
-            }
+    let axes = [
+        (other(job.along), &prepared.side, &prepared.path),
+        (job.along, &prepared.path, &prepared.side),
+    ];
+    let mut words = Vec::new();
+    for (along, own, across) in axes {
+        match smooth(&surface, along, &own.breaks, &across.breaks) {
+            Ok(widths) => words.extend(super::width_words(job, widths.into_iter())?),
+            Err(crease) => return Err(job.origin.error("cut.spacing", crease, REMEDY)),
         }
     }
-    None
+    prepared.words.splice(..words.len(), words);
+    Ok(())
+}
+
+/// Widths of the spans between knots of one parameter; `across`: those of the other.
+fn smooth(
+    surface: &SurfaceEvaluator,
+    along: job::Along,
+    knots: &[f64],
+    across: &[f64],
+) -> Result<Vec<f64>, String> {
+    let name = along.name();
+    let [low, high] = [across[0], across[across.len() - 1]];
+    let width = knots[knots.len() - 1] - knots[0];
+    let derivative = |knot: f64, k: u32| {
+        let at = low + (high - low) * (f64::from(k) + 0.5) / f64::from(CREASE_POINTS);
+        match along {
+            job::Along::U => surface.at(knot, at).u,
+            job::Along::V => surface.at(at, knot).v,
+        }
+    };
+    let mut scale = 1.0;
+    let mut widths = vec![knots[1] - knots[0]];
+    for ends in knots[1..].windows(2) {
+        let sides = |k: u32| [-CREASE_STEP, CREASE_STEP].map(|step| derivative(ends[0] + step * width, k));
+        let [before, after] = sides(CREASE_POINTS / 2);
+        let ratio = after.length() / before.length();
+        let factor = if (ratio - 1.0).abs() > CREASE_MAX {
+            ratio
+        } else {
+            1.0
+        };
+        for k in 0..CREASE_POINTS {
+            let [before, after] = sides(k);
+            let before = before * factor;
+            let is_smooth = before.distance(after) <= CREASE_MAX * before.length().max(after.length());
+            if !is_smooth {
+                return Err(format!(
+                    "passes of constant scallop height need a tangent plane that is continuous, but the derivative along {name} jumps at {name} = {}",
+                    ends[0]
+                ));
+            }
+        }
+        scale *= factor;
+        widths.push((ends[1] - ends[0]) * scale);
+    }
+    Ok(widths)
 }
 
 /// Where passes from the edge begin: on the last side boundary where that alone is a single point.

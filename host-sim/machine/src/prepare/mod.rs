@@ -84,6 +84,25 @@ impl Prepared {
         }
     }
 
+    /// The core's unit of the side parameter in a span, in the parameter's own: 1, except where the widths of the spans make derivatives continuous.
+    #[must_use]
+    pub fn side_unit(&self, span: u16) -> f32 {
+        let span = usize::from(span);
+        let own = self.side.breaks.get(span..).and_then(<[f64]>::first_chunk);
+        let word = self
+            .words
+            .get(span)
+            .map(|word| f32::from_bits(word.cast_unsigned()));
+        match (self.header.spacing.is_constant(), own, word) {
+            (true, Some([start, end]), Some(width)) => {
+                #[allow(clippy::cast_possible_truncation, reason = "the machine's own precision")]
+                let unit = (end - start) as f32 / width;
+                unit
+            }
+            _ => 1.0,
+        }
+    }
+
     /// Size of the header and of the surface's data in the machine's memory, bytes.
     #[must_use]
     pub fn bytes(&self) -> usize {
@@ -163,6 +182,7 @@ pub fn prepare(job: &Job) -> Result<Prepared, JobError> {
         Some(region) => region::add(job, region, &mut prepared)?,
         None => [us[0], vs[0]],
     };
+    fronts::smooth_widths(job, &mut prepared)?;
     if prepared.header.spacing == Spacing::Constant {
         prepared.header.spacing = fronts::spacing_from_edge(job, &prepared);
     }
@@ -173,8 +193,11 @@ pub fn prepare(job: &Job) -> Result<Prepared, JobError> {
 
 /// Words of the widths of spans.
 fn widths(job: &Job, axis: &ParameterSpans) -> Result<Vec<i32>, JobError> {
-    let spans = axis.breaks.windows(2).map(|ends| ends[1] - ends[0]);
-    spans
+    width_words(job, axis.breaks.windows(2).map(|ends| ends[1] - ends[0]))
+}
+
+fn width_words(job: &Job, widths: impl Iterator<Item = f64>) -> Result<Vec<i32>, JobError> {
+    widths
         .map(|width| {
             encode::width(width)
                 .map_err(|error| job.origin.error("surface", error.to_string(), "widen its range"))
