@@ -3,6 +3,7 @@
 mod in_qemu;
 mod over_line;
 mod regions;
+mod turns;
 
 use interp_core::job::stream::{head_words, row_words};
 use interp_core::{Command, Interpolator, Sample, State};

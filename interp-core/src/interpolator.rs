@@ -487,6 +487,9 @@ impl Motion {
             self.is_starved = true;
         } else if has_limits {
             sequencer.set_has_rows();
+            if let (Some(estimator), _) = run.estimator_and_lines() {
+                estimator.grant_rows(&rows);
+            }
         }
         Ok(self.is_starved)
     }

@@ -77,35 +77,39 @@ fn the_first_passes_of_a_hundred_rows() {
     }
 }
 
-/// A region of 12 x 32 patches, more than the store holds, in cells and with links: the whole run.
+/// A region of 12 x 32 patches, more than the store holds, in cells and with links, without turns and with them: the whole runs.
 #[test]
-fn a_region_of_more_patches_than_the_store() {
-    let mut job = prepare(&regions::in_cells(4, [12, 32], regions::with_hole(2.0))).unwrap();
-    assert!(job.patches() > 309 && job.header.window >= 3 && job.header.strips > 1);
-    let links: Vec<Link> = (machine::links::between(&machine::links::passes(&job))
-        .iter()
-        .zip(0..))
-    .map(|([from, to], index)| match index % 2 {
-        0 => Link::Straight,
-        _ => Link::Across(from[2].max(to[2]) + 300_000),
-    })
-    .collect();
-    machine::links::add(&mut job, &links);
-    let wanted = expected(&job);
-    println!(
-        "{} passes, {} strips, {} words, window {}",
-        wanted.len(),
-        job.header.strips,
-        job.words.len(),
-        job.header.window
-    );
+fn regions_of_more_patches_than_the_store() {
     let (_qemu, stream) = Qemu::start(images::for_qemu()).unwrap();
     let mut session = Session::open(stream, 1).unwrap();
     make_ready(&mut session, &Setup::simulated(Configuration::DEFAULT)).unwrap();
-    drive::upload(&mut session, &job, |_| {}).unwrap();
-    let ran = drive::run_digests(&mut session, &wanted, true, None, |_| {}).unwrap();
-    assert_eq!(ran.status.state, State::Finished, "{:?}", ran.status);
-    assert_eq!(ran.first_bad_pass, None, "{ran:?}");
-    assert_eq!(Some(ran.status.digest), wanted.last().map(|pass| pass.digest));
-    assert_eq!(ran.status.stream.received as usize, job.words.len());
+    for overrun_mm in [0.0, 2.0] {
+        let mut job = regions::in_cells(4, [12, 32], regions::with_hole(2.0));
+        job.overrun_mm = overrun_mm;
+        let mut job = prepare(&job).unwrap();
+        assert!(job.patches() > 309 && job.header.window >= 3 && job.header.strips > 1);
+        let passes = machine::links::passes(&job);
+        let links: Vec<Link> = (machine::links::between(&passes).iter().zip(0..))
+            .map(|([from, to], index)| match index % 2 {
+                0 => Link::Straight,
+                _ => Link::Across(from[2].max(to[2]) + 300_000),
+            })
+            .collect();
+        machine::links::add(&mut job, &links);
+        let wanted = expected(&job);
+        println!(
+            "{} passes, {} strips, {} words, window {}, {} rows at once",
+            wanted.len(),
+            job.header.strips,
+            job.words.len(),
+            job.header.window,
+            job.least_rows
+        );
+        drive::upload(&mut session, &job, |_| {}).unwrap();
+        let ran = drive::run_digests(&mut session, &wanted, true, None, |_| {}).unwrap();
+        assert_eq!(ran.status.state, State::Finished, "{:?}", ran.status);
+        assert_eq!(ran.first_bad_pass, None, "{ran:?}");
+        assert_eq!(Some(ran.status.digest), wanted.last().map(|pass| pass.digest));
+        assert_eq!(ran.status.stream.received as usize, job.words.len());
+    }
 }

@@ -14,7 +14,7 @@ use machine::remote::session::{Event, Stream};
 use machine::remote::{RemoteError, Session, drive};
 use protocol::message::{Configuration, Reason, Request, Status};
 
-use super::{CUTS, bumpy, expected, regions};
+use super::{CUTS, bumpy, expected, regions, turns};
 
 /// Words of the board's store: room for five rows of the test's jobs.
 const WORDS: usize = 1800;
@@ -110,6 +110,12 @@ impl Bench {
         Self::of(job)
     }
 
+    /// With turns between the rests that the window makes.
+    fn with_turns() -> Self {
+        let job = prepare(&turns::job([3, 24], [6.0, 2.0])).unwrap();
+        Self::of(streamed(&job, 5))
+    }
+
     fn of(job: Prepared) -> Self {
         assert!(head_words(&job.header) + job.least_rows * row_words(&job.header) <= WORDS);
         assert!(job.words.len() > 2 * WORDS);
@@ -151,11 +157,12 @@ impl Bench {
 /// On a free clock and in lockstep; with a host that is awake, and one that sleeps so long before each chunk that the run waits for every row.
 #[test]
 fn a_board_runs_a_job_that_is_larger_than_its_store() {
-    let benches: [fn() -> Bench; 4] = [
+    let benches: [fn() -> Bench; 5] = [
         || Bench::new(CUTS[0]),
         || Bench::new(CUTS[3]),
         || Bench::new(CUTS[4]),
         Bench::of_region,
+        Bench::with_turns,
     ];
     for new in benches {
         for lockstep in [false, true] {
@@ -199,7 +206,7 @@ fn dropped_bytes_change_nothing() {
         drops_one_in: 100,
         ..GOOD
     };
-    for bench in [Bench::new(CUTS[4]), Bench::of_region()] {
+    for bench in [Bench::new(CUTS[4]), Bench::of_region(), Bench::with_turns()] {
         let status = bench.run(line, true);
         assert!(status.frames_bad > 100, "{}", status.frames_bad);
     }
@@ -210,7 +217,8 @@ fn dropped_bytes_change_nothing() {
 fn another_host_goes_on_with_the_stream() {
     let plain = [1, 3, 6].map(|away_after| (away_after, Bench::new(CUTS[4])));
     let of_region = [1, 9, 20, 31].map(|away_after| (away_after, Bench::of_region()));
-    for (away_after, bench) in plain.into_iter().chain(of_region) {
+    let turned = [1, 14, 30].map(|away_after| (away_after, Bench::with_turns()));
+    for (away_after, bench) in plain.into_iter().chain(of_region).chain(turned) {
         let wanted = expected(&bench.job);
         let mut session = bench.loaded(GOOD);
         session.command(&Request::Start).unwrap();

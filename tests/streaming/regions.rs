@@ -97,8 +97,7 @@ fn a_streamed_region_is_the_whole_one() {
 /// Rows of half an interval: the window cuts intervals short, in the same way whatever the ring.
 #[test]
 fn narrow_rows() {
-    for cut in 0..CUTS.len() {
-        let (text, machine) = CUTS[cut];
+    for (text, machine) in CUTS {
         for window in [3, 4, 7] {
             let mut job = bumpy([3, 40], [5.0, 0.2], text, machine);
             job.region = Some(Region::new(vec![

@@ -51,15 +51,12 @@ pub(crate) fn check_header(header: &Header) -> Result<()> {
         .map_or(Ok(()), |axes| check_axes(header, axes))
 }
 
-/// A job that is loaded while it runs: straight passes over a grid, without turns, because the tool has to be able to wait at the end of each pass. Strips of rows are
-/// those of a region.
+/// A job that is loaded while it runs: straight passes over a grid. Strips of rows are those of a region.
 fn check_streamed(header: &Header) -> Result<()> {
     let is_grid = matches!(header.kind, SurfaceKind::Polynomial | SurfaceKind::Rational);
-    let turns = header.axes.is_some_and(|axes| axes.overrun_mm > 0.0);
     let has_strips = header.strips > 0;
     if !is_grid
         || header.spacing.is_constant()
-        || turns
         || header.window < WINDOW_MIN
         || has_strips != (header.edges > 0)
     {

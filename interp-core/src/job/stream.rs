@@ -19,6 +19,9 @@
 //! after the first one that is needed then: the pass's own, that of the pass before, or, where the tool goes along the boundary from one to the other, that of the pass before
 //! that (`pass/row_history.rs`). Where an interval reaches farther it is cut short: none whose three times are in a row.
 //!
+//! **Turns.** Where turns lead from pass to pass the tool is not at rest, so nothing can be waited for. At a rest all rows of the window are asked for, and turns lead on for as
+//! long as these last; then the tool rests at the end of a pass. So a job with turns rests more often than one that is no stream, by its window alone.
+//!
 //! **Waiting.** The planning of a pass begins only when the rows that it needs are checked. Until then the whole machine stands still at the end of the last
 //! pass but one, or above it: neither tool nor planning goes on, and the tick is not counted. So the samples are those of a job that was loaded before.
 
@@ -121,6 +124,8 @@ impl StripInJob {
 pub struct RowsNeeded {
     /// The first row that is still needed of the passes before it; none where these are over.
     pub behind: Option<u16>,
+    /// The row of the pass before it.
+    pub before: u16,
     /// Its own row.
     pub own: u16,
     /// The last row that is looked at from there.
@@ -141,9 +146,8 @@ pub(crate) struct Rows {
     strips: u16,
     strips_from: u32,
     start: StripInJob,
-    /// The strips of the last pass but one and of the last one that rows were asked for, and the row of that.
+    /// The strips of the last pass but one and of the last one that rows were asked for.
     current: [StripInJob; 2],
-    own: u16,
     /// What was asked for last.
     asked: Option<RowsNeeded>,
     /// Place of the first row that is needed, and of the oldest that is not overwritten.
@@ -176,7 +180,6 @@ impl Rows {
             strips_from: 0,
             start: none,
             current: [none; 2],
-            own: 0,
             asked: None,
             first: 0,
             oldest: 0,
@@ -345,14 +348,13 @@ impl Rows {
     /// The first pass is the next one.
     const fn begin(&mut self) {
         self.current = [self.start; 2];
-        self.own = self.start.strip.first;
         self.asked = None;
     }
 
-    /// The strip of the next pass, in this row.
-    fn strip_of(&self, store: &[i32], row: u16) -> Option<StripInJob> {
+    /// The strip of the next pass, in this row, behind one in that row.
+    fn strip_of(&self, store: &[i32], row: u16, before: u16) -> Option<StripInJob> {
         let [_, now] = &self.current;
-        if row >= self.own && now.strip.index(row).is_some() {
+        if row >= before && now.strip.index(row).is_some() {
             return Some(*now);
         }
         let number = now.number.saturating_add(1);
@@ -372,7 +374,9 @@ impl Rows {
     /// has to be there at once, with the words that it takes.
     pub(crate) fn ask(&mut self, store: &[i32], needed: &RowsNeeded) -> Result<bool> {
         let absent = || Fault::new(FaultKind::WrongState, f32::from(needed.own));
-        let strip = self.strip_of(store, needed.own).ok_or_else(absent)?;
+        let strip = self
+            .strip_of(store, needed.own, needed.before)
+            .ok_or_else(absent)?;
         let [_, now] = &self.current;
         let last = strip
             .place(needed.last.min(strip.strip.last()))
@@ -394,7 +398,6 @@ impl Rows {
             return self.bad.map_or(Ok(false), Err);
         }
         self.current = [*now, strip];
-        self.own = needed.own;
         self.asked = Some(*needed);
         Ok(true)
     }

@@ -12,7 +12,16 @@ use crate::sample::SpanParameter;
 pub(crate) struct RowHistory {
     /// Row of the pass that is planned, of the one before it, and of the one before that.
     rows: [u16; 3],
+    /// The last row that is sure to be there, in a job with turns, and the row of the next pass that rows were asked for.
+    granted: u16,
+    asked: Option<u16>,
+    /// A turn leads to the pass that is planned, so that nothing can be waited for before it.
+    is_turned: bool,
 }
+
+/// Room of a turn, in steps: from the pass that it leads to up to the rows that can be waited for only at the next rest. The planning of the next pass but one takes
+/// two, and more where the steps grow.
+const STEPS_TURNED: f32 = 4.0;
 
 /// The first row that is needed where the planning of a pass begins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,6 +32,8 @@ enum FirstRow {
     Before,
     /// That of the pass before that one, whose end the tool leaves along the surface's boundary.
     Left,
+    /// The same, where turns may lead from pass to pass: all rows of the window from there on are asked for at a rest, and turns lead on for as long as these last.
+    Turned,
 }
 
 impl FirstRow {
@@ -30,6 +41,7 @@ impl FirstRow {
         match (&header.axes, header.pattern) {
             (None, _) => Self::Own,
             (Some(_), Pattern::Zig) => Self::Before,
+            (Some(axes), Pattern::Zigzag) if axes.overrun_mm > 0.0 => Self::Turned,
             (Some(_), Pattern::Zigzag) => Self::Left,
         }
     }
@@ -37,17 +49,43 @@ impl FirstRow {
 
 impl RowHistory {
     /// Before the first pass.
-    pub(crate) const START: Self = Self { rows: [u16::MAX; 3] };
+    pub(crate) const START: Self = Self {
+        rows: [u16::MAX; 3],
+        granted: 0,
+        asked: None,
+        is_turned: false,
+    };
 
     /// The planning of a pass in this row begins. Behind the first pass of a job, and where the rows are not next to those of the pass before it, the window begins
-    /// with it.
-    pub(crate) const fn enter(&mut self, header: &Header, row: u16) {
+    /// with it. `is_turned`: a turn leads to it.
+    pub(crate) fn enter(&mut self, header: &Header, row: u16, is_turned: bool) {
         let [last, before, _] = self.rows;
-        self.rows = if self.jumps(header, row) {
-            [row; 3]
+        if self.jumps(header, row) {
+            self.rows = [row; 3];
+            self.granted = Self::last_from(row, header);
         } else {
-            [row, last, before]
-        };
+            self.rows = [row, last, before];
+        }
+        self.is_turned = is_turned;
+        self.asked = None;
+    }
+
+    /// The rows that the next pass needs are there.
+    pub(crate) const fn grant(&mut self, needed: &RowsNeeded) {
+        self.granted = needed.last;
+        self.asked = Some(needed.own);
+    }
+
+    /// Whether the next pass, in this row, lies outside the window, and its rows were not asked for: behind a turn.
+    pub(crate) fn lacks(&self, header: &Header, row: u16) -> bool {
+        let [own, ..] = self.rows;
+        let is_first = own == u16::MAX;
+        header.window > 0 && !is_first && self.jumps(header, row) && self.asked != Some(row)
+    }
+
+    /// The last row of the window from this one on.
+    const fn last_from(row: u16, header: &Header) -> u16 {
+        row.saturating_add(header.window).saturating_sub(1)
     }
 
     /// Whether a pass in this row, after the one that was entered, lies outside its window: in another cell of a region, or beyond a gap.
@@ -59,14 +97,13 @@ impl RowHistory {
     /// Side spans that the planning of the pass may look at, from the first one.
     pub(crate) fn spans(&self, header: &Header) -> u16 {
         let [own, before, left] = self.rows;
-        Self::from(
-            match FirstRow::of(header) {
-                FirstRow::Own => own,
-                FirstRow::Before => before,
-                FirstRow::Left => left,
-            },
-            header,
-        )
+        match FirstRow::of(header) {
+            FirstRow::Own => Self::from(own, header),
+            FirstRow::Before => Self::from(before, header),
+            FirstRow::Left => Self::from(left, header),
+            FirstRow::Turned if header.window == 0 => header.side_spans,
+            FirstRow::Turned => header.side_spans.min(self.granted.saturating_add(1)),
+        }
     }
 
     fn from(at: u16, header: &Header) -> u16 {
@@ -94,11 +131,17 @@ impl RowHistory {
             return schedule::next_side(from, step, header.side_spans, width);
         }
         let [own, before, _] = self.rows;
-        let last = |row: u16| row.saturating_add(header.window).saturating_sub(1);
+        let last = |row: u16| Self::last_from(row, header);
         let (spans, last) = match FirstRow::of(header) {
             FirstRow::Own => (self.spans(header), u16::MAX),
             FirstRow::Before => (self.spans(header), last(own)),
-            FirstRow::Left => (self.spans(header).min(last(own)), last(before)),
+            FirstRow::Left | FirstRow::Turned => (self.spans(header).min(last(own)), last(before)),
+        };
+        // Behind a turn the next pass is planned with the rows that are there: it is left a row of its own.
+        let last = if self.is_turned && !self.has_all(header, self.granted) {
+            last.min(self.granted.saturating_sub(1))
+        } else {
+            last
         };
         let side = schedule::next_side(from, step, spans, width)?;
         Ok(if side.span >= last && last < header.side_spans {
@@ -109,6 +152,32 @@ impl RowHistory {
         } else {
             side
         })
+    }
+
+    /// Whether rows up to this one are all that the passes may need.
+    const fn has_all(&self, header: &Header, row: u16) -> bool {
+        row.saturating_add(1) >= header.side_spans
+    }
+
+    /// Whether a turn may lead from the pass that is planned to the next one: whether the rows last for what is planned before the tool can come to rest again.
+    pub(crate) fn may_turn(
+        &self,
+        header: &Header,
+        [from, to]: [SpanParameter; 2],
+        width: impl Fn(u16) -> f32,
+    ) -> bool {
+        if header.window == 0 {
+            return true;
+        }
+        let [_, before, _] = self.rows;
+        let granted = if self.is_turned {
+            self.granted
+        } else {
+            self.granted.max(Self::last_from(before, header))
+        };
+        let room = STEPS_TURNED * schedule::apart(from, to, &width);
+        let end = schedule::next_side(to, room, header.side_spans, &width);
+        self.has_all(header, granted) || end.is_ok_and(|end| end.span.saturating_add(1) < granted)
     }
 
     /// The rows that the planning of the pass after this one needs: at `side`, with lines at `step` beside it, as far as that is known.
@@ -123,8 +192,9 @@ impl RowHistory {
         let behind = match FirstRow::of(header) {
             FirstRow::Own => None,
             FirstRow::Before => Some(own),
-            FirstRow::Left => Some(before),
+            FirstRow::Left | FirstRow::Turned => Some(before),
         };
+        let step = step.filter(|_| FirstRow::of(header) != FirstRow::Turned);
         let is_near = !self.jumps(header, side.span);
         let first = behind.filter(|_| is_near).unwrap_or(side.span);
         let spans = Self::from(first, header);
@@ -137,6 +207,7 @@ impl RowHistory {
         };
         RowsNeeded {
             behind,
+            before: own,
             own: side.span,
             last,
         }

@@ -517,7 +517,7 @@ impl Run {
         if let PassPlanning::Scan(scan) = &mut self.planning {
             // With limits the estimator is the look-ahead's.
             if job.header.axes.is_none() {
-                scan.estimator().enter_row(job.header, route.side.span);
+                scan.estimator().enter_row(job.header, route.side.span, false);
             }
             scan.begin(&route, goes_on);
         }

@@ -114,14 +114,19 @@ impl StepOverEstimator {
         self.search = EdgeSearch::DONE;
     }
 
-    /// The pass that is looked at from here on is in this row.
-    pub(crate) const fn enter_row(&mut self, header: &Header, row: u16) {
-        self.rows.enter(header, row);
+    /// The pass that is looked at from here on is in this row. `is_turned`: a turn leads to it.
+    pub(crate) fn enter_row(&mut self, header: &Header, row: u16, is_turned: bool) {
+        self.rows.enter(header, row, is_turned);
     }
 
     /// Rows of the last passes.
     pub(crate) const fn rows(&self) -> &RowHistory {
         &self.rows
+    }
+
+    /// The rows that the next pass needs are there.
+    pub(crate) const fn grant_rows(&mut self, needed: &RowsNeeded) {
+        self.rows.grant(needed);
     }
 
     /// Side parameter of the pass after the one at `from`, by the step to it.

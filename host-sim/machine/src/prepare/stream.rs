@@ -44,13 +44,6 @@ pub(super) fn fit(job: &Job, prepared: Prepared) -> Result<Prepared, JobError> {
             "write spacing = \"exact\", ",
         );
     }
-    if job.overrun_mm > 0.0 {
-        return no(
-            "cut.overrun_mm",
-            "the tool has to be able to wait for the next ones at the end of each pass",
-            "remove `overrun_mm`, ",
-        );
-    }
     let header = Header {
         window: WINDOW_MIN,
         ..prepared.header

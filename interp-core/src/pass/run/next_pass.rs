@@ -354,6 +354,12 @@ impl Run {
         }
     }
 
+    /// Whether the planning of the next pass, in this row, has to wait until its rows were asked for.
+    pub(crate) fn lacks_rows(&self, job: &Job<'_>, row: u16) -> bool {
+        let estimator = self.estimator_ref();
+        estimator.is_some_and(|estimator| estimator.rows().lacks(job.header, row))
+    }
+
     /// Row of patches that the tool is in.
     pub(crate) const fn row(&self) -> u16 {
         self.travel.route.side.span

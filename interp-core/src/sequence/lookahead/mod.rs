@@ -336,7 +336,7 @@ impl Lookahead {
             Task::Close => {
                 if let Some(whole) = self.whole {
                     self.close_within(&whole, out);
-                    self.task = self.choose_link(job, axes, out);
+                    self.task = self.choose_link(job, axes, None, out);
                     return Ok(());
                 }
                 if !self.goes_on && looks_again(job, estimator.as_deref_mut()) {
@@ -345,8 +345,9 @@ impl Lookahead {
                     self.begin(pass, route, &head, out);
                     return Ok(());
                 }
+                let rows = estimator.as_deref().map(|estimator| *estimator.rows());
                 if self.close(job, estimator, lines, out)? {
-                    self.choose_link(job, axes, out)
+                    self.choose_link(job, axes, rows.as_ref(), out)
                 } else {
                     Task::Seek
                 }
@@ -359,9 +360,9 @@ impl Lookahead {
                     let is_joined = |route: &Route| lines.joins(job.header, &out.route, route, rows);
                     out.steps_over =
                         job.header.pattern == Pattern::Zigzag && out.next.as_ref().is_some_and(is_joined);
-                    self.choose_link(job, axes, out)
+                    self.choose_link(job, axes, rows, out)
                 }
-                NextPass::None => self.choose_link(job, axes, out),
+                NextPass::None => self.choose_link(job, axes, None, out),
             },
             Task::Head(index) => {
                 self.push_half(true, index, out);

@@ -8,6 +8,7 @@ use crate::feed::stations::{Station, WINDOW, Window};
 use crate::feed::turn::{self, Turn, TurnEnd};
 use crate::job::AxisLimits;
 use crate::job::program::Job;
+use crate::pass::row_history::RowHistory;
 
 impl Lookahead {
     /// No turn is tried for some passes: the plan before the last one is slower than a rest would make it.
@@ -147,11 +148,22 @@ impl Lookahead {
         });
     }
 
-    /// Begins to look for a turn where there may be one.
-    pub(super) fn choose_link(&mut self, job: &Job<'_>, axes: &AxisLimits, out: &PassPlan) -> Task {
+    /// Begins to look for a turn where there may be one. `rows`: those of the last passes.
+    pub(super) fn choose_link(
+        &mut self,
+        job: &Job<'_>,
+        axes: &AxisLimits,
+        rows: Option<&RowHistory>,
+        out: &PassPlan,
+    ) -> Task {
         let rests = self.without > 0;
         self.without = self.without.saturating_sub(1);
-        if !rests && self.may_turn(job, axes, out) {
+        let has_rows = out.next.zip(rows).is_none_or(|(next, rows)| {
+            rows.may_turn(job.header, [out.route.side, next.side], |span| {
+                job.side_width(span)
+            })
+        });
+        if !rests && has_rows && self.may_turn(job, axes, out) {
             Task::Across
         } else {
             Task::Done

@@ -73,6 +73,8 @@ pub(super) enum Planning {
     Awaited(u32),
     /// It is to be begun, for this number of the pass on the plan's route.
     Requested(u32),
+    /// It waits for the rows of patches of the pass with this number, which a turn before the last one could not know of.
+    AwaitsRows(u32),
     /// Its stations are being located.
     Stations,
     /// Its feed is being planned.
@@ -274,6 +276,11 @@ impl Sequencer {
     /// The rows of patches that are needed to go on, where the tool stands before a pass whose successor is to be planned next: at the end of the pass before it, or
     /// above its start. With the pass begins the planning of that successor.
     pub(crate) fn rows_needed(&self, job: &Job<'_>, run: &Run) -> Option<RowsNeeded> {
+        if let Planning::AwaitsRows(_) = self.planning {
+            let (_, next) = self.plans_ref();
+            let is_at_rest = matches!(self.phase, Phase::Await | Phase::AwaitGoal(_));
+            return run.rows_ahead(job, next.route.side).filter(|_| is_at_rest);
+        }
         if self.has_rows || self.pending.is_some() || !self.is_planned() {
             return None;
         }
@@ -291,7 +298,11 @@ impl Sequencer {
 
     /// They are there.
     pub(crate) const fn set_has_rows(&mut self) {
-        self.has_rows = true;
+        if let Planning::AwaitsRows(pass) = self.planning {
+            self.planning = Planning::Requested(pass);
+        } else {
+            self.has_rows = true;
+        }
     }
 
     /// Whether [`Self::rows_needed`] is to be asked.
@@ -466,7 +477,7 @@ impl Sequencer {
         let (now, next) = self.plans_ref();
         let is_located = !matches!(
             self.planning,
-            Planning::Awaited(_) | Planning::Requested(..) | Planning::Stations
+            Planning::Awaited(_) | Planning::Requested(..) | Planning::AwaitsRows(_) | Planning::Stations
         );
         match self.phase {
             Phase::StepOver => Some(now),

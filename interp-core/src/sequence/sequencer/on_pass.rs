@@ -165,7 +165,8 @@ impl Sequencer {
             self.goal = Goal::Pass;
             // Planning never delays the lift: what is not planned yet is waited for above the surface.
             let is_planned = self.pending.is_none() && self.planning == Planning::Complete;
-            let is_low = (job.header.axes.as_ref()).is_some_and(|axes| job.link_to(next.pass, axes).is_low());
+            let is_low = (job.header.axes.as_ref())
+                .is_some_and(|axes| job.link_to(now.pass.wrapping_add(1), axes).is_low());
             if is_low {
                 // It would take longer to rise to the safe height than to wait.
                 self.phase = Phase::Await;

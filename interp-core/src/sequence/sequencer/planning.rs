@@ -78,7 +78,7 @@ impl Sequencer {
             || wants_more
             || self.pass_ahead().is_some()
             || (self.pending.is_none()
-                && (self.planning != Planning::Complete
+                && (!matches!(self.planning, Planning::Complete | Planning::AwaitsRows(_))
                     || self.has_to_plan_step_over()
                     || self.has_hop
                     || self.may_choose()
@@ -126,7 +126,7 @@ impl Sequencer {
                     }
                 }
             }
-            Planning::Awaited(_) => {}
+            Planning::Awaited(_) | Planning::AwaitsRows(_) => {}
         }
         let mut makes_front = false;
         for piece in 0..PIECES_MAX {
@@ -242,6 +242,7 @@ impl Sequencer {
         Some(match self.planning {
             Planning::Awaited(_) => return None,
             Planning::Requested(..) => BEGIN_CYCLES,
+            Planning::AwaitsRows(_) => 0,
             Planning::Stations => self.lookahead.cycles(run.estimator_ref()),
             Planning::Feed => self.planner.cycles(&next.plan),
             Planning::Complete if self.has_hop => HOP_CYCLES,
@@ -316,13 +317,17 @@ impl Sequencer {
                 Ok(NextRoute::None) => self.planning = Planning::Complete,
                 Err(fault) => self.pending = Some(fault),
             },
+            Planning::AwaitsRows(_) => {}
+            Planning::Requested(pass) if run.lacks_rows(job, next.route.side.span) => {
+                self.planning = Planning::AwaitsRows(pass);
+            }
             Planning::Requested(pass) => {
-                if let (Some(estimator), _) = run.estimator_and_lines() {
-                    estimator.enter_row(job.header, next.route.side.span);
-                }
                 if pass == self.first.pass {
                     // It begins at rest, wherever the pass before it would have led.
                     now.tail = Turn::NONE;
+                }
+                if let (Some(estimator), _) = run.estimator_and_lines() {
+                    estimator.enter_row(job.header, next.route.side.span, now.tail.exists());
                 }
                 self.lookahead.begin(pass, next.route, &now.tail, next);
                 next.is_last = run.is_last_pass();

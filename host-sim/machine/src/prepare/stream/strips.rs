@@ -50,18 +50,16 @@ impl Strips {
         let first = heads(prepared).next().unwrap_or(0) >> FRACTION_BITS;
         let first = u16::try_from(first).unwrap_or(0).min(end);
         let mut strips = vec![[first, first.saturating_add(window - 1).min(end)]];
-        let mut own = first;
         for needed in needed {
             let last = needed.last.min(end);
             // What lies beyond a gap is a strip of its own only where the core's window begins anew.
-            let most = own.saturating_add(window - 1);
+            let most = needed.before.saturating_add(window - 1);
             match strips.last_mut() {
-                Some([_, behind]) if needed.own >= own && needed.own <= most.max(*behind + 1) => {
+                Some([_, behind]) if needed.own >= needed.before && needed.own <= most.max(*behind + 1) => {
                     *behind = last.max(*behind);
                 }
                 _ => strips.push([needed.own, last]),
             }
-            own = needed.own;
         }
         let strip = |[first, last]: [u16; 2]| Strip {
             first,
@@ -72,7 +70,7 @@ impl Strips {
 
     /// Rows that have to be there at once.
     fn least(&self, needed: &[RowsNeeded]) -> usize {
-        let (mut number, mut at, mut own, mut first) = (0, 0, 0, 0);
+        let (mut number, mut at, mut first) = (0, 0, 0);
         let mut least = 0;
         for needed in needed {
             let place = |at: usize, number: usize, row: u16| {
@@ -80,12 +78,11 @@ impl Strips {
                 at + usize::from(strip.and_then(|strip| strip.index(row)).unwrap_or(0))
             };
             let behind = needed.behind.map(|row| place(at, number, row));
-            if needed.own < own || self.0[number].index(needed.own).is_none() {
+            if needed.own < needed.before || self.0[number].index(needed.own).is_none() {
                 at += usize::from(self.0[number].rows);
                 number = (number + 1).min(self.0.len() - 1);
             }
-            own = needed.own;
-            first = behind.unwrap_or_else(|| place(at, number, own)).max(first);
+            first = behind.unwrap_or_else(|| place(at, number, needed.own)).max(first);
             let last = needed.last.min(self.0[number].first + self.0[number].rows - 1);
             least = least.max(place(at, number, last) + 1 - first);
         }
