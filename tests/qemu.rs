@@ -135,7 +135,7 @@ fn constant_scallop_height() {
     ]);
 }
 
-/// Passes clipped to a region, without axis limits and with them.
+/// Passes clipped to a region, without axis limits and with them, straight and curved.
 #[test]
 fn region() {
     let with_limits = {
@@ -158,10 +158,15 @@ fn region() {
     .collect();
     machine::links::add(&mut with_links, &links);
     assert!(with_links.header.links > 10);
+    let curved = job("fan_region");
+    let mut curved_with_links = curved.clone();
+    machine::links::add(&mut curved_with_links, &links);
     compare_prepared(&[
         ("region", job("region")),
         ("region with limits", with_limits),
         ("region with links", with_links),
+        ("fan_region", curved),
+        ("fan_region with links", curved_with_links),
         ("torus", job("torus")),
     ]);
 }

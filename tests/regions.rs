@@ -1,5 +1,7 @@
 //! Jobs with a region: passes end at its boundary, none is left out, and the scallop height is within its limit between them.
 
+mod curved;
+
 use std::path::PathBuf;
 
 use inspect::BOUNDS;
@@ -62,7 +64,8 @@ fn region(random: &mut Random, domain: [[f64; 2]; 2]) -> Region {
     Region::new(loops)
 }
 
-fn random_job(seed: u64) -> Job {
+/// A random region on the surface of a sample job, with straight passes; or with passes of constant scallop height.
+fn random_job(seed: u64, is_curved: bool) -> Job {
     let mut random = Random(seed);
     let (name, scallop_mm) = random.one_of(&[
         ("plate", 0.1),
@@ -83,24 +86,31 @@ fn random_job(seed: u64) -> Job {
     job.along = random.one_of(&[Along::U, Along::V]);
     job.pattern = random.one_of(&[Pattern::Zig, Pattern::Zigzag]);
     job.spacing = random.one_of(&[Spacing::Exact, Spacing::Exact, Spacing::FirstOrder]);
+    if is_curved {
+        (job.spacing, job.feed_mm_min) = (Spacing::Constant(job::Start::Edge), 1800.0);
+    }
     job.region = Some(region(&mut random, job.surface.domain()));
     job
+}
+
+/// `REGIONS` of them, from `REGIONS_FROM` on.
+fn seeds(usual: u64) -> std::ops::Range<u64> {
+    let number = |name: &str, usual: u64| {
+        let given = std::env::var(name).ok();
+        given.and_then(|count| count.parse().ok()).unwrap_or(usual)
+    };
+    let first = number("REGIONS_FROM", 0);
+    first..first + number("REGIONS", usual)
 }
 
 /// Random regions on the surfaces of the sample jobs: every sample is checked by the oracle, whose clipping is its own.
 #[test]
 fn random_regions() {
-    let seeds: u64 = std::env::var("REGIONS")
-        .ok()
-        .and_then(|count| count.parse().ok())
-        .unwrap_or(12);
-    let first: u64 = std::env::var("REGIONS_FROM")
-        .ok()
-        .and_then(|count| count.parse().ok())
-        .unwrap_or(0);
+    let seeds = seeds(12);
+    let count = seeds.end - seeds.start;
     let (mut passes, mut prepared_jobs, mut parted) = (0, 0, 0);
-    for seed in first..first + seeds {
-        let job = random_job(seed);
+    for seed in seeds {
+        let job = random_job(seed, false);
         let about = format!(
             "seed {seed}: {:?} {:?} {:?} {:?}, {} loops",
             job.machine.has_limits(),
@@ -145,7 +155,7 @@ fn random_regions() {
         }
     }
     assert!(
-        seeds < 20 || passes > 400 && prepared_jobs > 15 && parted > 1,
+        count < 20 || passes > 400 && prepared_jobs > 15 && parted > 1,
         "{passes} {prepared_jobs} {parted}"
     );
 }
@@ -219,8 +229,9 @@ fn regions_that_the_machine_does_not_take() {
         "{}",
         refused(&job)
     );
-    job.spacing = Spacing::Constant(job::Start::Edge);
-    assert!(refused(&job).starts_with("passes of constant scallop height are made for a whole surface only"));
+    job.region = Some(comb(2));
+    job.spacing = Spacing::Constant(job::Start::Middle);
+    assert!(refused(&job).starts_with("passes of constant scallop height within a region begin on its edge"));
 }
 
 /// Links with heights of their own leave the passes as they are; each rises to its height, and no farther than a hop of its length gains by; within the limits, in less time.

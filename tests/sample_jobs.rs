@@ -56,9 +56,10 @@ macro_rules! jobs {
     };
 }
 
-// Numbers of passes from the paper, from the golden table, and for the other jobs from the oracle's dense scan, but for curved passes.
+// Of regions that are not parted into cells. Numbers of passes from the paper, from the golden table, and for the other jobs from the oracle's dense scan, but for curved passes.
 jobs! {
     fan: 87,
+    fan_region: 101,
     far_plate: 18,
     freeform: 135,
     plate: 164,

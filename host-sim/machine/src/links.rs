@@ -3,7 +3,7 @@
 //! Passes do not depend on their links, so the job is run once with every link at the safe height, and then given its words.
 
 use interp_core::job::links::{Detour, LINK_HEIGHT_MIN, LINK_STRAIGHT};
-use interp_core::{STORE_WORDS, State};
+use interp_core::{STORE_WORDS, State, front_words};
 
 use crate::Machine;
 use crate::prepare::{Prepared, stream};
@@ -57,7 +57,8 @@ pub fn add(prepared: &mut Prepared, links: &[Link]) {
     let spare = if is_streamed {
         stream::spare_words(prepared)
     } else {
-        STORE_WORDS.saturating_sub(prepared.words.len())
+        let stations = front_words(&prepared.header).unwrap_or(0);
+        STORE_WORDS.saturating_sub(prepared.words.len() + stations)
     };
     let words = links.iter().take(spare).map(|link| match link {
         Link::Straight => LINK_STRAIGHT,

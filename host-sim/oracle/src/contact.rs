@@ -168,6 +168,7 @@ impl Oracle {
                 region,
                 job.along,
                 breaks.map(|parameter| surface.breaks(parameter)),
+                job.spacing.is_constant(),
             )
         };
         let region = job.region.as_ref().map(edges);

@@ -7,6 +7,8 @@ use job::{Along, Region};
 
 /// A place of the machine, as a share of the longest span between two knots: the machine's patches are those or shorter.
 const PLACE_SHARE: f64 = 1.0 / 2_097_152.0;
+/// A place of curved passes on the side parameter, as a share of all of it: theirs ends a few of these before the surface does.
+const SIDE_SHARE: f64 = 8.0 / 268_435_456.0;
 /// Distance from the boundary within which an end of a pass is on it, in places: the rounding of the vertices, of the line, and of the crossing.
 const NEAR_PLACES: f64 = 3.0;
 /// Length of an interval that is a pass in any case, as a share of a plane's step-over: the machine leaves out those below 0.1 where the path parameter is fastest,
@@ -25,7 +27,8 @@ pub struct RegionEdges {
 }
 
 impl RegionEdges {
-    pub(super) fn new(region: &Region, along: Along, breaks: [Vec<f64>; 2]) -> Self {
+    /// `is_curved`: the passes are curves; their places on the side parameter are shares of the whole.
+    pub(super) fn new(region: &Region, along: Along, breaks: [Vec<f64>; 2], is_curved: bool) -> Self {
         let swapped = |[u, v]: [f64; 2]| match along {
             Along::U => [u, v],
             Along::V => [v, u],
@@ -34,9 +37,14 @@ impl RegionEdges {
             let widths = breaks.windows(2).map(|ends| ends[1] - ends[0]);
             widths.fold(0.0, f64::max) * PLACE_SHARE
         };
+        let mut place = breaks.each_ref().map(|breaks| longest(breaks));
+        if let ([_, sides], true) = (&breaks, is_curved) {
+            let whole = sides.last().unwrap_or(&0.0) - sides.first().unwrap_or(&0.0);
+            place[1] = place[1].max(SIDE_SHARE * whole);
+        }
         Self {
             edges: region.edges().map(|edge| edge.map(swapped)).collect(),
-            place: breaks.each_ref().map(|breaks| longest(breaks)),
+            place,
         }
     }
 
@@ -50,6 +58,15 @@ impl RegionEdges {
             .collect();
         crossings.sort_by(f64::total_cmp);
         crossings
+    }
+
+    /// Whether a place on (path, side) lies inside, by the even-odd rule.
+    fn contains(&self, [path, side]: [f64; 2]) -> bool {
+        let crossed = |[from, to]: &&[[f64; 2]; 2]| {
+            (from[1] <= side) != (to[1] <= side)
+                && from[0] + (side - from[1]) / (to[1] - from[1]) * (to[0] - from[0]) <= path
+        };
+        self.edges.iter().filter(crossed).count() % 2 == 1
     }
 
     /// Distance of a place on (path, side) from the boundary, in the machine's places.
@@ -143,8 +160,7 @@ impl Oracle {
             return true;
         };
         let (path, side) = self.swapped(u, v);
-        let below = region.crossings(side).iter().filter(|at| **at <= path).count();
-        below % 2 == 1
+        region.contains([path, side])
     }
 
     /// Whether (u, v) is in the region and at least this far from those parts of its boundary that are not the surface's, mm: by the metric there, along the path
@@ -184,6 +200,53 @@ impl Oracle {
             .iter()
             .filter(|edge| is_cut(edge))
             .all(|edge| distance(edge) >= depth_mm)
+    }
+
+    /// Whether (u, v) is so deep in the region that a pass serves it: half of the step-over, of a curved pass of that in the direction in which it is greatest.
+    /// Everything is where the job has none.
+    #[must_use]
+    pub fn is_served(&self, u: f64, v: f64) -> bool {
+        if self.region.is_none() {
+            return true;
+        }
+        let depth_mm = self.contact(u, v).map_or(f64::INFINITY, |contact| {
+            if self.spacing.is_constant() {
+                let room = 1.0 - contact.fit(self.radius_mm);
+                (8.0 * self.radius_mm * self.scallop_mm / room.max(0.0)).sqrt()
+            } else {
+                contact.step_over_mm
+            }
+        });
+        self.is_deep_in_region(u, v, 0.5 * depth_mm)
+    }
+
+    /// Whether a place of a curved pass is in a cell of the region, or on its boundary but for the machine's rounding.
+    pub(super) fn is_on_pass(&self, path: f64, side: f64) -> bool {
+        let mut cells = self.cells.iter();
+        self.region.is_none() || cells.any(|region| region.contains([path, side]) || region.is_on(path, side))
+    }
+
+    /// Whether a curved pass may begin or end here: on the boundary of a cell, or at its last line, above which only slivers are left.
+    pub(super) fn is_end(&self, path: f64, side: f64, last_lines: &[f64]) -> bool {
+        let near = self.near_side();
+        self.cells.iter().zip(last_lines).any(|(cell, last)| {
+            cell.is_on(path, side) || (side >= last - near && cell.contains([path, side]))
+        })
+    }
+
+    /// The last line of each cell; infinite where that holds no pass.
+    pub(super) fn last_lines(&self) -> Vec<f64> {
+        let cells = (0..self.cells.len()).map(|index| self.of_cell(index));
+        cells
+            .map(|cell| {
+                let [first, last] = cell.pass_range();
+                if cell.is_empty_between(first, last) {
+                    f64::INFINITY
+                } else {
+                    cell.last_line()
+                }
+            })
+            .collect()
     }
 
     /// Intervals of a line that lie in the region, ascending; the whole line where the job has none.

@@ -64,6 +64,8 @@ pub struct Verifier {
     current: Option<PassState>,
     /// Ends of the passes on the current line of a region.
     on_line: Vec<[f64; 2]>,
+    /// Of curved passes in a region, the last line of each cell.
+    last_lines: Vec<f64>,
 }
 
 /// State of the current pass.
@@ -106,6 +108,11 @@ impl Verifier {
             report,
             current: None,
             on_line: Vec::new(),
+            last_lines: if oracle.spacing.is_constant() && oracle.region.is_some() {
+                oracle.last_lines()
+            } else {
+                Vec::new()
+            },
         }
     }
 
@@ -157,12 +164,16 @@ impl Verifier {
         if let Some(pass) = self.current {
             self.report.complete = pass.finished;
             let [_, end] = self.oracle.outer_passes();
-            self.report.last_on_boundary = if self.oracle.region.is_some() {
-                self.check_line(pass.side);
-                self.is_cell_done(pass.side) && self.cells_without_pass(self.cell_index + 1)
-            } else {
-                pass.side == end
-            };
+            self.report.last_on_boundary =
+                if self.oracle.spacing.is_constant() && self.oracle.region.is_some() {
+                    let last = self.last_lines.iter().rfind(|last| last.is_finite());
+                    last.is_none_or(|last| pass.side >= last - self.oracle.near_side())
+                } else if self.oracle.region.is_some() {
+                    self.check_line(pass.side);
+                    self.is_cell_done(pass.side) && self.cells_without_pass(self.cell_index + 1)
+                } else {
+                    pass.side == end
+                };
         }
         self.report
     }
@@ -182,6 +193,9 @@ impl Verifier {
 
     /// Whether an end of a curved pass is on no boundary of the surface.
     fn is_off_curve(&self, path: f64, side: f64) -> bool {
+        if self.oracle.region.is_some() {
+            return !self.oracle.is_end(path, side, &self.last_lines);
+        }
         !self.oracle.path_range().contains(&path) && !self.oracle.side_range().contains(&side)
     }
 
@@ -289,9 +303,14 @@ impl Verifier {
         let is_region = self.oracle.region.is_some();
         let before = self.current;
         match self.current {
-            _ if is_region => {
+            _ if is_region && !is_curve => {
                 let start = [self.at_boundary(sample, path, side), side];
                 self.begin_interval(sample, start, spot);
+            }
+            None if is_region => {
+                let start = [path, side];
+                let is_first = self.cell.is_first_line(start) || self.enters_cell(None, start);
+                self.report.first_on_boundary = sample.pass == 0 && is_first;
             }
             None => {
                 let [start, _] = self.oracle.outer_passes();
@@ -327,7 +346,7 @@ impl Verifier {
             self.report.off_boundary += 1;
         }
         self.report.passes += 1;
-        let same_line = before.filter(|before| is_region && before.side == side);
+        let same_line = before.filter(|before| is_region && !is_curve && before.side == side);
         let line = match (before, same_line) {
             (_, Some(before)) => before.line,
             (Some(before), None) => before.line + 1,
@@ -344,7 +363,7 @@ impl Verifier {
             samples: same_line.map_or(0, |before| before.samples),
             finished: false,
             line,
-            start: if is_region {
+            start: if is_region && !is_curve {
                 self.at_boundary(sample, path, side)
             } else {
                 path
@@ -404,7 +423,8 @@ impl Verifier {
         };
         pass.path = at[0];
         let backwards = older.is_some_and(|older| (at[0] - last[0]) * (last[0] - older[0]) <= 0.0);
-        if backwards || at[0] == last[0] || pass.finished {
+        let is_outside = !self.oracle.is_on_pass(at[0], at[1]);
+        if backwards || at[0] == last[0] || pass.finished || is_outside {
             self.report.off_pass += 1;
             return (None, None);
         }

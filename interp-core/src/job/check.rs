@@ -5,7 +5,9 @@ use crate::fault::{Fault, FaultKind, Result};
 use crate::job::program::front_words;
 use crate::job::region::REGION_SPANS_MAX;
 use crate::job::stream::WINDOW_MIN;
-use crate::job::{AxisLimits, CELLS_MAX, Header, OVERRUN_MAX_MM, SPANS_MAX, STEP_MAX_MM, SurfaceKind};
+use crate::job::{
+    AxisLimits, CELLS_MAX, Header, OVERRUN_MAX_MM, SPANS_MAX, STEP_MAX_MM, Spacing, SurfaceKind,
+};
 use crate::math::number::nm_to_mm;
 
 pub(crate) fn check_header(header: &Header) -> Result<()> {
@@ -19,10 +21,12 @@ pub(crate) fn check_header(header: &Header) -> Result<()> {
         }
     }
     let spans = header.path_spans.max(header.side_spans);
-    if header.edges > 0 && (header.spacing.is_constant() || spans > REGION_SPANS_MAX) {
+    let begins_elsewhere = header.spacing.is_constant() && header.spacing != Spacing::Constant;
+    if header.edges > 0 && (begins_elsewhere || spans > REGION_SPANS_MAX) {
         return Err(Fault::new(FaultKind::BadHeader, f32::from(header.edges)));
     }
-    if header.links > 0 && (header.spacing.is_constant() || header.axes.is_none()) {
+    let of_whole = header.spacing.is_constant() && header.edges == 0;
+    if header.links > 0 && (of_whole || header.axes.is_none()) {
         return Err(Fault::new(FaultKind::BadHeader, f32::from(header.links)));
     }
     if front_words(header).is_none() {

@@ -76,7 +76,7 @@ pub fn front_words(header: &Header) -> Option<usize> {
     if !header.spacing.is_constant() {
         return Some(0);
     }
-    (header.path_spans <= FRONT_SPANS_MAX).then(|| Stations::most(header.path_spans).words())
+    (header.path_spans <= FRONT_SPANS_MAX).then(|| Stations::most(header.path_spans).words(header.edges > 0))
 }
 
 impl Program {

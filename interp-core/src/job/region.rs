@@ -11,13 +11,19 @@
 //! A place on a parameter is an i32: the span in the upper bits, the fraction in the lower [`FRACTION_BITS`]. Edges of constant side are left out. A line meets an
 //! edge where lower end <= line < upper end, so that one through a vertex meets one of two edges that pass on and none or both of two that turn back. Between the
 //! first crossing and the second, the third and the fourth, ... the line is inside.
+//!
+//! For passes of constant scallop height a place on the side parameter is a share of all of it, units of 2^-[`FRONT_SIDE_BITS`], counted from the starts of its spans
+//! ([`front_side_starts`]), and edges of constant side are among the others: curves cross them. The shortest interval is a place on the path there, too.
 
 use crate::job::Header;
+use crate::math::arith::{to_f32, truncated};
 use crate::sample::SpanParameter;
 
 /// Bits of the fraction of a place.
 pub const FRACTION_BITS: u32 = 21;
 const FRACTION_MASK: i32 = (1 << FRACTION_BITS) - 1;
+/// Bits of the side parameter as a share of all of it.
+pub const FRONT_SIDE_BITS: u32 = 28;
 /// Words of an edge, and of the head of a cell.
 pub const EDGE_WORDS: usize = 4;
 /// Most edges that a line may meet; half as many intervals.
@@ -39,6 +45,30 @@ pub const fn end_of(spans: u16) -> i32 {
     (spans as i32) << FRACTION_BITS
 }
 
+/// Where each span of the side parameter begins, as a share of all of it, by the spans' widths: the places of edges are between them.
+pub fn front_side_starts(widths: &[f32]) -> impl Iterator<Item = i32> {
+    let mut sum = 0.0;
+    for width in widths {
+        sum += width;
+    }
+    let mut start = 0_i32;
+    widths.iter().map(move |width| {
+        let own = start;
+        start = start.saturating_add(front_side_width(*width, front_side_scale(sum)));
+        own
+    })
+}
+
+/// Units per unit of the parameter's widths, by their sum.
+pub(crate) fn front_side_scale(sum: f32) -> f32 {
+    to_f32(1 << FRONT_SIDE_BITS) / sum
+}
+
+/// Width of a span other than the last, whose width is what is left.
+pub(crate) fn front_side_width(width: f32, scale: f32) -> i32 {
+    truncated(width * scale).max(1)
+}
+
 /// An edge, from its lower end upwards.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Edge {
@@ -49,6 +79,16 @@ pub struct Edge {
 }
 
 impl Edge {
+    /// The edge between two vertices for curved passes, which cross edges of constant side, too; none where both are the same.
+    #[must_use]
+    pub fn for_fronts(a: [i32; 2], b: [i32; 2]) -> Option<Self> {
+        let ([a_path, a_side], [b_path, b_side]) = (a, b);
+        Self::between(a, b).or((a_path != b_path).then_some(Self {
+            side: [a_side, b_side],
+            path: [a_path, b_path],
+        }))
+    }
+
     /// The edge between two vertices, each a place on the path and one on the side parameter; none where the side is the same.
     #[must_use]
     pub const fn between(a: [i32; 2], b: [i32; 2]) -> Option<Self> {
@@ -108,17 +148,26 @@ impl Edge {
         i32::try_from(i64::from(path_from) + moved).unwrap_or(path_from)
     }
 
-    /// Whether its places are on the surface, and it goes upwards.
+    /// Whether its places are on the surface, and it goes upwards, or for curved passes not downwards.
     pub(crate) const fn is_sound(&self, header: &Header) -> bool {
         let ([from, to], [path_from, path_to]) = (self.side, self.path);
-        let (side_end, path_end) = (end_of(header.side_spans), end_of(header.path_spans));
+        let (side_end, path_end) = (side_end(header), end_of(header.path_spans));
         0 <= from
-            && from < to
+            && (from < to || from == to && header.spacing.is_constant())
             && to <= side_end
             && 0 <= path_from
             && path_from <= path_end
             && 0 <= path_to
             && path_to <= path_end
+    }
+}
+
+/// The end of the side parameter.
+const fn side_end(header: &Header) -> i32 {
+    if header.spacing.is_constant() {
+        1 << FRONT_SIDE_BITS
+    } else {
+        end_of(header.side_spans)
     }
 }
 
@@ -238,7 +287,7 @@ impl CellWords<'_> {
             && self.least() > 0
             && 0 <= self.first()
             && self.first() <= self.last()
-            && self.last() <= end_of(header.side_spans)
+            && self.last() <= side_end(header)
     }
 }
 
@@ -305,12 +354,25 @@ impl ScanLine {
         self.task = Task::Meet(0);
     }
 
-    /// Goes to the first line of another cell.
-    pub(crate) const fn begin(&mut self, side: i32) {
+    /// Goes to a line of another cell, or to one that does not go on from the last one; the region may reach there from `before`.
+    pub(crate) const fn begin(&mut self, side: i32, before: i32) {
         self.taken = 0;
         self.count = 0;
         self.go_on(side, true);
-        self.before = i32::MIN;
+        self.before = before;
+    }
+
+    /// Begins with the crossings of a curve, which [`Self::insert`] takes.
+    pub(crate) const fn begin_curve(&mut self) {
+        self.met = 0;
+        self.joins = [false; 2];
+        self.task = Task::Done;
+    }
+
+    /// The region reaches from the pass before to this one along a boundary of the path parameter: at its start, or at its end.
+    pub(crate) const fn join(&mut self, [is_near, is_far]: [bool; 2]) {
+        let [near, far] = self.joins;
+        self.joins = [near || is_near, far || is_far];
     }
 
     /// The whole rest of the work on a line whose edges are taken in.
@@ -393,7 +455,7 @@ impl ScanLine {
                 for index in index..end {
                     let number = self.active.get(usize::from(index)).copied().unwrap_or(0);
                     if let Some(edge) = cell.edge(number) {
-                        self.meet(&edge, path_end);
+                        self.meet(&edge, path_end)?;
                     }
                 }
                 if end < self.count {
@@ -452,14 +514,24 @@ impl ScanLine {
     }
 
     /// Inserts the crossing with an edge.
-    fn meet(&mut self, edge: &Edge, path_end: i32) {
+    fn meet(&mut self, edge: &Edge, path_end: i32) -> Result<(), BadLine> {
         let at = edge.crossing(self.side);
         let ([from, _], [path_from, path_to]) = (edge.side, edge.path);
         if path_from == path_to && from <= self.before {
-            let [near, far] = self.joins;
-            self.joins = [near || at == 0, far || at == path_end];
+            self.join([at == 0, at == path_end]);
         }
-        let mut place = usize::from(self.met).min(CROSSINGS_MAX - 1);
+        self.insert(at)
+    }
+
+    /// Inserts a crossing.
+    ///
+    /// # Errors
+    /// There is no room for it.
+    pub(crate) fn insert(&mut self, at: i32) -> Result<(), BadLine> {
+        let mut place = usize::from(self.met);
+        if place >= CROSSINGS_MAX {
+            return Err(BadLine);
+        }
         while place > 0 {
             let before = self.crossings.get(place - 1).copied().unwrap_or(i32::MIN);
             if before <= at {
@@ -474,10 +546,14 @@ impl ScanLine {
             *to = at;
         }
         self.met += 1;
+        Ok(())
     }
 
     /// Joins intervals that meet, and keeps those that are at least this long.
-    fn keep(&mut self, least: i32) -> Result<(), BadLine> {
+    ///
+    /// # Errors
+    /// Their number is odd.
+    pub(crate) fn keep(&mut self, least: i32) -> Result<(), BadLine> {
         if self.met % 2 == 1 {
             return Err(BadLine);
         }

@@ -4,8 +4,9 @@ use crate::job::program::Job;
 use crate::math::arith::{count_to_f32, power_of_two};
 use crate::sample::SpanParameter;
 
-/// Words of a station.
+/// Words of a station, and of one of a job with a region: a front that holds no pass has columns of its own.
 const COLUMNS: usize = 13;
+const COLUMNS_OF_REGION: usize = COLUMNS + 2;
 /// Parts of each path span between stations, as powers of two: at least, and at most for a surface of many spans.
 const BITS_MIN: u8 = 1;
 const BITS_MANY: u8 = 3;
@@ -63,9 +64,10 @@ impl Stations {
         self.intervals() as u16 + 1
     }
 
-    /// Words of the table.
-    pub(crate) const fn words(self) -> usize {
-        COLUMNS * self.count() as usize
+    /// Words of the table, of a job with or without a region.
+    pub(crate) const fn words(self, in_region: bool) -> usize {
+        let columns = if in_region { COLUMNS_OF_REGION } else { COLUMNS };
+        columns * self.count() as usize
     }
 
     /// Path span of an interval.

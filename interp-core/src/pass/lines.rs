@@ -56,7 +56,7 @@ impl RegionLines {
         step: 0.0,
     };
 
-    /// Resets to the first line of a job with a region.
+    /// Resets to the first line of a job with a region. Curved passes are found elsewhere.
     pub(crate) fn restart(&mut self, job: &Job<'_>, first: &FirstLine) {
         self.is_in_use = false;
         self.reversed = false;
@@ -66,16 +66,17 @@ impl RegionLines {
         if let Some(cell) = self.cell(job) {
             self.line.restart(first);
             // It was checked at load.
-            self.is_in_use = self.line.finish(&cell, end_of(job.header.path_spans)).is_ok();
+            let is_known = self.line.finish(&cell, end_of(job.header.path_spans)).is_ok();
+            self.is_in_use = is_known && !job.header.spacing.is_constant();
         }
     }
 
     /// The words of the cell.
-    fn cell<'a>(&self, job: &Job<'a>) -> Option<CellWords<'a>> {
+    pub(crate) fn cell<'a>(&self, job: &Job<'a>) -> Option<CellWords<'a>> {
         job.region()?.cell(self.cell)
     }
 
-    /// The line, for the checks of a job that is loaded.
+    /// The line: for the checks of a job that is loaded, and for the crossings of a curve.
     pub(crate) const fn scratch(&mut self) -> &mut ScanLine {
         &mut self.line
     }
@@ -105,24 +106,97 @@ impl RegionLines {
         if !self.has_more() {
             return None;
         }
-        let index = if self.reversed {
-            self.line.intervals().saturating_sub(1 + self.done)
-        } else {
-            self.done
-        };
-        let [from, to] = self.line.interval(index)?;
-        self.done += 1;
+        self.take_on(side_at(header, self.line.side()))
+    }
+
+    /// The next pass on the line at this side parameter.
+    pub(crate) fn take_on(&mut self, side: SpanParameter) -> Option<Route> {
+        let [from, to] = self.next_interval()?;
         let ends = if self.reversed {
             [place_to(to), place_from(from)]
         } else {
             [place_from(from), place_to(to)]
         };
         Some(Route {
-            side: side_at(header, self.line.side()),
+            side,
             reversed: self.reversed,
             ends,
+            joins: false,
             front: None,
         })
+    }
+
+    /// The next interval of the line in the order of travel, ends ascending.
+    pub(crate) fn next_interval(&mut self) -> Option<[i32; 2]> {
+        let index = if self.reversed {
+            self.line.intervals().checked_sub(self.done.checked_add(1)?)?
+        } else {
+            self.done
+        };
+        let ends = self.line.interval(index)?;
+        self.done += 1;
+        Some(ends)
+    }
+
+    /// Goes to the intervals of a line, or of a curve, that is known.
+    pub(crate) const fn begin_passes(&mut self, reversed: bool) {
+        self.done = 0;
+        self.reversed = reversed;
+    }
+
+    pub(crate) const fn is_reversed(&self) -> bool {
+        self.reversed
+    }
+
+    /// Whether the line that is known has an interval.
+    pub(crate) const fn has_intervals(&self) -> bool {
+        self.line.intervals() > 0
+    }
+
+    /// Whether an interval is left.
+    pub(crate) const fn is_any_left(&self) -> bool {
+        self.done < self.line.intervals()
+    }
+
+    /// Whether the first pass of the line goes on from the one before along the boundary of the path parameter that it begins at.
+    pub(crate) fn is_joined(&self) -> bool {
+        let [near, far] = self.line.joins();
+        self.done == 1 && if self.reversed { far } else { near }
+    }
+
+    /// Begins a line of a job of curved passes; the region may reach there from `before`.
+    pub(crate) const fn begin_line(&mut self, side: i32, before: i32) {
+        self.line.begin(side, before);
+    }
+
+    /// A portion of the work on it.
+    ///
+    /// # Errors
+    /// [`FaultKind::BadPatch`] with the number of the front, where the line meets too many edges.
+    pub(crate) fn work_line(&mut self, job: &Job<'_>, number: u32) -> Result<()> {
+        let Some(cell) = self.cell(job) else {
+            return Ok(());
+        };
+        let worked = self.line.work(&cell, end_of(job.header.path_spans));
+        worked.map_err(|_| too_many(number))
+    }
+
+    /// Whether the line is known.
+    pub(crate) fn is_line_known(&self) -> bool {
+        self.line.is_done()
+    }
+
+    /// Goes to the next cell, if there is one.
+    pub(crate) fn enter_next_cell(&mut self, job: &Job<'_>) {
+        if let Some(cell) = self.cell(job) {
+            self.cell = cell.next();
+        }
+    }
+
+    /// Whether a cell is behind this one.
+    pub(crate) fn has_next_cell(&self, job: &Job<'_>) -> bool {
+        let next = self.cell(job).map(|cell| cell.next());
+        next.is_some_and(|next| job.region().is_some_and(|region| region.cell(next).is_some()))
     }
 
     /// Whether the tool may go on the surface, along the boundary, from the end of a pass to the start of this one, which is the first on its line. `rows`: those of
@@ -187,7 +261,7 @@ impl RegionLines {
             return false;
         };
         self.cell = next;
-        self.line.begin(cell.first());
+        self.line.begin(cell.first(), i32::MIN);
         true
     }
 
@@ -200,18 +274,11 @@ impl RegionLines {
         if self.has_more() {
             return Ok(NextPass::Found);
         }
-        let Some(cell) = self.cell(job) else {
-            return Ok(NextPass::None);
-        };
         if !self.is_seeking {
             return Ok(NextPass::None);
         }
         if !self.line.is_done() {
-            let worked = self.line.work(&cell, end_of(job.header.path_spans));
-            if worked.is_err() {
-                let pass = crate::math::arith::count_to_f32(pass);
-                return Err(Fault::new(FaultKind::BadPatch, pass));
-            }
+            self.work_line(job, pass)?;
             return Ok(NextPass::Sought);
         }
         if self.line.intervals() == 0 {
@@ -227,6 +294,11 @@ impl RegionLines {
         self.reversed = job.header.pattern == Pattern::Zigzag && !self.reversed;
         Ok(NextPass::Found)
     }
+}
+
+/// A line, or a curve, meets too many edges.
+pub(crate) fn too_many(number: u32) -> Fault {
+    Fault::new(FaultKind::BadPatch, crate::math::arith::count_to_f32(number))
 }
 
 /// The side parameter of a line: the boundary where the line is a unit or less below it, because no edge reaches it.

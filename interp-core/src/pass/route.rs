@@ -15,6 +15,8 @@ pub(crate) struct Route {
     pub(crate) reversed: bool,
     /// Start and end, by the surface's own path parameter.
     pub(crate) ends: [SpanParameter; 2],
+    /// A curved pass in a region: the region reaches to its start from the end of the pass before along a boundary of the path parameter, if that ends there, too.
+    pub(crate) joins: bool,
     /// The front that it lies on, if it is not a line.
     pub(crate) front: Option<FrontLine>,
 }
@@ -33,6 +35,7 @@ impl Route {
         side: SpanParameter { span: 0, fraction: 0 },
         reversed: false,
         ends: [SpanParameter { span: 0, fraction: 0 }; 2],
+        joins: false,
         front: None,
     };
 
@@ -47,6 +50,7 @@ impl Route {
             side,
             reversed,
             ends: if reversed { [far, near] } else { [near, far] },
+            joins: false,
             front: None,
         }
     }

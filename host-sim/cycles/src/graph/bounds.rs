@@ -53,6 +53,11 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "intervals of a line, and one more: CROSSINGS_MAX / 2 + 1",
     ),
     (
+        "interp_core::job::region::ScanLine::insert",
+        32,
+        "crossings of a curve: CROSSINGS_MAX",
+    ),
+    (
         "interp_core::job::region::ScanLine::meet",
         32,
         "crossings of a line: CROSSINGS_MAX",
@@ -319,6 +324,31 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "interp_core::pass::front::advance::stepping::pass_over",
         16,
         "places that are passed over: CHUNK",
+    ),
+    (
+        "interp_core::pass::front::clip::FrontClip::cross_edges",
+        64,
+        "edges of a portion: PORTION",
+    ),
+    (
+        "interp_core::pass::front::clip::FrontClip::cross_piece",
+        3,
+        "parts of a piece of an edge, between its ends and two extrema",
+    ),
+    (
+        "interp_core::pass::front::clip::FrontClip::extend",
+        64,
+        "edges of a portion: EXTENT_EDGES",
+    ),
+    (
+        "interp_core::pass::front::clip::FrontClip::widen",
+        24,
+        "stations of a portion: WINDOW_STATIONS",
+    ),
+    (
+        "interp_core::pass::front::clip::crossing",
+        21,
+        "halvings of an interval: PLACE_BITS",
     ),
     (
         "interp_core::pass::front::part::PartSearch::look",

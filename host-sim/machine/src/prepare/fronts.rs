@@ -16,7 +16,7 @@ const CREASE_MAX: f64 = 1e-3;
 /// Radius of a circle that is a point, mm.
 const POINT_MM: f64 = 1e-5;
 
-/// Refuses too many path spans, and a job for whose stations the store has no room.
+/// Refuses a region that ends on a point, too many path spans, and a job for whose stations the store has no room.
 ///
 /// # Errors
 /// As above.
@@ -25,6 +25,12 @@ pub(super) fn check(job: &Job, prepared: &Prepared) -> Result<(), JobError> {
         return Ok(());
     }
     let no = |what: String, remedy: &str| Err(job.origin.error("cut.spacing", what, remedy));
+    if ends_on_point(job, prepared) {
+        return no(
+            "passes of constant scallop height within a region cannot come to a boundary that is a single point, only begin there".to_owned(),
+            &format!("end the region before it, let the passes run along the other parameter, or {REMEDY}"),
+        );
+    }
     let Some(words) = front_words(&prepared.header) else {
         return no(
             format!(
@@ -120,6 +126,20 @@ fn smooth(
     Ok(widths)
 }
 
+/// Whether a region reaches to a last side boundary that is a single point.
+fn ends_on_point(job: &Job, prepared: &Prepared) -> bool {
+    let [_, is_point] = side_poles(job, prepared);
+    let [us, vs] = job.surface.domain();
+    is_point
+        && job.region.as_ref().is_some_and(|region| {
+            let [of_u, of_v] = region.extent();
+            match job.along {
+                job::Along::U => of_v[1] >= vs[1],
+                job::Along::V => of_u[1] >= us[1],
+            }
+        })
+}
+
 /// Where passes from the edge begin: on the last side boundary where that alone is a single point.
 pub(super) fn spacing_from_edge(job: &Job, prepared: &Prepared) -> Spacing {
     match side_poles(job, prepared) {
@@ -138,12 +158,12 @@ fn side_poles(job: &Job, prepared: &Prepared) -> [bool; 2] {
     };
     match prepared.header.kind {
         SurfaceKind::Polynomial => {
-            for words in records.as_chunks().0 {
+            for words in records.as_chunks().0.iter().take(prepared.patches()) {
                 add(PolynomialRecord::from_words(words).edges);
             }
         }
         SurfaceKind::Rational => {
-            for words in records.as_chunks().0 {
+            for words in records.as_chunks().0.iter().take(prepared.patches()) {
                 add(RationalRecord::from_words(words).edges);
             }
         }

@@ -178,12 +178,12 @@ pub fn prepare(job: &Job) -> Result<Prepared, JobError> {
         surface => grid::prepare(job, header, &Source::new(surface)),
     }?;
     let [us, vs] = job.surface.domain();
+    fronts::smooth_widths(job, &mut prepared)?;
     let start = match &job.region {
         Some(region) => region::add(job, region, &mut prepared)?,
         None => [us[0], vs[0]],
     };
-    fronts::smooth_widths(job, &mut prepared)?;
-    if prepared.header.spacing == Spacing::Constant {
+    if prepared.header.spacing == Spacing::Constant && job.region.is_none() {
         prepared.header.spacing = fronts::spacing_from_edge(job, &prepared);
     }
     prepared.header.axes = axes::axes(job, sign, start)?;

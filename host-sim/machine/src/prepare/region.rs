@@ -2,9 +2,13 @@
 //!
 //! Vertices are rounded to places of the path and the side parameter, 2^-21 of a span. The first and the last line are the first and the last that meet an interval
 //! that is long enough, so the machine finds a pass on both. A cell that holds no pass is left out.
+//!
+//! For passes of constant scallop height a place on the side parameter is a share of all of it, edges of constant side are kept, and a cell is cut off at its last line.
 
-use interp_core::job::region::{CROSSINGS_MAX, Edge, FRACTION_BITS, REGION_SPANS_MAX};
-use job::{Along, Job, JobError, Region};
+use interp_core::job::region::{
+    CROSSINGS_MAX, Edge, FRACTION_BITS, FRONT_SIDE_BITS, REGION_SPANS_MAX, front_side_starts,
+};
+use job::{Along, Job, JobError, Region, Spacing, Start};
 
 use super::geometry::SurfaceEvaluator;
 use super::{ParameterSpans, Prepared};
@@ -14,6 +18,10 @@ const LEAST_SHARE: f64 = 0.1;
 /// Points along and across each span at which the speed of the path parameter is taken.
 const SPEEDS: u32 = 9;
 
+/// Distance of the last line of curved passes from the end of the side parameter, at least: 6 nm in 100 mm.
+const BEFORE_END: i32 = 16;
+/// Sizes of places that differ by less, relatively, are the same: the rounding of spans of some thousand places.
+const SAME_SCALE: f64 = 1e-4;
 /// Widths of spans that differ by less, relatively, are the same: over 1024 spans it adds up to less than a place.
 const SAME_WIDTH: f64 = 1e-10;
 
@@ -22,13 +30,13 @@ const KEY: &str = "region.loops";
 /// Refuses what passes of a region are not made for.
 ///
 /// # Errors
-/// Passes of constant scallop height.
+/// Passes of constant scallop height from the middle.
 pub(super) fn check_job(job: &Job) -> Result<(), JobError> {
-    if job.region.is_some() && job.spacing.is_constant() {
+    if job.region.is_some() && job.spacing == Spacing::Constant(Start::Middle) {
         return Err(job.origin.error(
-            "cut.spacing",
-            "passes of constant scallop height are made for a whole surface only",
-            "write spacing = \"exact\", or remove the section [region]",
+            "cut.start",
+            "passes of constant scallop height within a region begin on its edge",
+            "write start = \"edge\"",
         ));
     }
     Ok(())
@@ -49,10 +57,11 @@ pub(super) fn add(job: &Job, region: &Region, prepared: &mut Prepared) -> Result
         );
     }
     let least = least(job, prepared);
+    let sides = SidePlaces::new(job, prepared);
     let mut start = None;
     let mut records = Vec::new();
     for part in region.parts() {
-        let edges = edges(job.along, &part, prepared);
+        let edges = edges(job.along, &part, prepared, &sides);
         let (side, most) = most_met(&edges);
         if most > CROSSINGS_MAX {
             let name = match job.along {
@@ -62,7 +71,7 @@ pub(super) fn add(job: &Job, region: &Region, prepared: &mut Prepared) -> Result
             return no(
                 format!(
                     "a pass at {name} = {:.6} meets {most} edges of the region, more than {CROSSINGS_MAX}",
-                    parameter(&prepared.side, side)
+                    sides.parameter(side)
                 ),
                 "let the passes run along the other parameter, or cut the region into several jobs",
             );
@@ -70,10 +79,11 @@ pub(super) fn add(job: &Job, region: &Region, prepared: &mut Prepared) -> Result
         let Some([first, last]) = lines(&edges, least) else {
             continue;
         };
+        let (edges, last) = sides.cut_off(edges, [first, last], least);
         let from = intervals(&edges, first, least)
             .first()
             .map_or(0, |[from, _]| *from);
-        start.get_or_insert([from, first]);
+        start.get_or_insert([parameter(&prepared.path, from), sides.parameter(first)]);
         let count = i32::try_from(edges.len()).unwrap_or(i32::MAX);
         records.push([count, first, last, least]);
         records.extend(edges.into_iter().map(Edge::to_words));
@@ -92,7 +102,6 @@ pub(super) fn add(job: &Job, region: &Region, prepared: &mut Prepared) -> Result
     };
     prepared.header.edges = edges;
     prepared.words.extend(records.into_flattened());
-    let (path, side) = (parameter(&prepared.path, path), parameter(&prepared.side, side));
     Ok(match job.along {
         Along::U => [path, side],
         Along::V => [side, path],
@@ -101,14 +110,15 @@ pub(super) fn add(job: &Job, region: &Region, prepared: &mut Prepared) -> Result
 
 /// The edges in order, without those of constant side. Places are fractions of spans, so an edge is parted where it crosses a knot between spans of
 /// different width: it is straight on both sides, but not over both.
-fn edges(along: Along, region: &Region, prepared: &Prepared) -> Vec<Edge> {
+fn edges(along: Along, region: &Region, prepared: &Prepared, sides: &SidePlaces<'_>) -> Vec<Edge> {
     let swapped = |[u, v]: [f64; 2]| match along {
         Along::U => [u, v],
         Along::V => [v, u],
     };
     let axes = [&prepared.path, &prepared.side];
-    let knots = axes.map(bends);
-    let at = |point: [f64; 2]| [0, 1].map(|k| place(axes[k], point[k]));
+    let mut knots = axes.map(bends);
+    knots[1].extend(sides.bends());
+    let at = |[path, side]: [f64; 2]| [place(axes[0], path), sides.place(side)];
     let mut edges = Vec::new();
     for [from, to] in region.edges() {
         let (from, to) = (swapped(from), swapped(to));
@@ -128,11 +138,124 @@ fn edges(along: Along, region: &Region, prepared: &Prepared) -> Vec<Edge> {
         edges.extend(
             vertices
                 .windows(2)
-                .filter_map(|ends| Edge::between(ends[0], ends[1])),
+                .filter_map(|ends| sides.edge(ends[0], ends[1])),
         );
     }
     edges.sort();
     edges
+}
+
+/// The places of the side parameter: of lines in spans, or of curved passes as shares of the whole.
+struct SidePlaces<'a> {
+    axis: &'a ParameterSpans,
+    /// Ends of the spans of a job of curved passes.
+    ends: Option<Vec<i32>>,
+}
+
+impl<'a> SidePlaces<'a> {
+    fn new(job: &Job, prepared: &'a Prepared) -> Self {
+        let axis = &prepared.side;
+        let ends = job.spacing.is_constant().then(|| {
+            let widths = prepared.words[..axis.spans()].iter();
+            let widths: Vec<f32> = widths.map(|word| f32::from_bits(word.cast_unsigned())).collect();
+            front_side_starts(&widths).chain([1 << FRONT_SIDE_BITS]).collect()
+        });
+        Self { axis, ends }
+    }
+
+    /// The place of a parameter, the nearest one.
+    #[allow(clippy::cast_possible_truncation, reason = "within the ends of a span")]
+    fn place(&self, at: f64) -> i32 {
+        let Some(ends) = &self.ends else {
+            return place(self.axis, at);
+        };
+        let breaks = &self.axis.breaks;
+        let span = breaks
+            .partition_point(|start| *start <= at)
+            .clamp(1, self.axis.spans())
+            - 1;
+        let share = ((at - breaks[span]) / (breaks[span + 1] - breaks[span])).clamp(0.0, 1.0);
+        ends[span] + (share * f64::from(ends[span + 1] - ends[span])).round() as i32
+    }
+
+    /// The parameter of a place.
+    fn parameter(&self, place: i32) -> f64 {
+        let Some(ends) = &self.ends else {
+            return parameter(self.axis, place);
+        };
+        let breaks = &self.axis.breaks;
+        let span = ends
+            .partition_point(|start| *start <= place)
+            .clamp(1, self.axis.spans())
+            - 1;
+        let share = f64::from(place - ends[span]) / f64::from(ends[span + 1] - ends[span]);
+        breaks[span] + share * (breaks[span + 1] - breaks[span])
+    }
+
+    /// The knots of curved passes at which a place changes its size, for a smooth parametrisation.
+    fn bends(&self) -> Vec<f64> {
+        let Some(ends) = &self.ends else {
+            return Vec::new();
+        };
+        let scales = ends.windows(2).zip(self.axis.breaks.windows(2));
+        let scales: Vec<f64> = scales
+            .map(|(ends, breaks)| f64::from(ends[1] - ends[0]) / (breaks[1] - breaks[0]))
+            .collect();
+        let knots = scales.windows(2).zip(&self.axis.breaks[1..]);
+        knots
+            .filter(|(scales, _)| (scales[0] - scales[1]).abs() > SAME_SCALE * scales[0])
+            .map(|(_, knot)| *knot)
+            .collect()
+    }
+
+    fn edge(&self, a: [i32; 2], b: [i32; 2]) -> Option<Edge> {
+        match self.ends {
+            Some(_) => Edge::for_fronts(a, b),
+            None => Edge::between(a, b),
+        }
+    }
+
+    /// For curved passes, the edges of what is below the last line, and that line: a little before the end of the side parameter, so that no rounding takes a pass beyond it.
+    fn cut_off(&self, edges: Vec<Edge>, [first, last]: [i32; 2], least: i32) -> (Vec<Edge>, i32) {
+        if self.ends.is_none() {
+            return (edges, last);
+        }
+        let mut last = last.min((1 << FRONT_SIDE_BITS) - BEFORE_END).max(first);
+        let mut back = 1;
+        loop {
+            let cut = Self::cut_above(&edges, last);
+            // Places are rounded anew where edges are cut: the line may be too short by one.
+            if last == first || !intervals(&cut, last, least).is_empty() {
+                return (cut, last);
+            }
+            last = (last - back).max(first);
+            back *= 2;
+        }
+    }
+
+    /// The edges of what is below a line and on it.
+    fn cut_above(edges: &[Edge], last: i32) -> Vec<Edge> {
+        // The last line crosses edges that end above it.
+        let end = last + 1;
+        let mut crossings = Vec::new();
+        let mut kept: Vec<Edge> = Vec::new();
+        for edge in edges {
+            let ([from, _], [path_from, _]) = (edge.side, edge.path);
+            if edge.meets(end) {
+                let at = edge.crossing(end);
+                crossings.push(at);
+                kept.extend(Edge::for_fronts([path_from, from], [at, end]));
+            } else if from <= end {
+                kept.push(*edge);
+            }
+        }
+        crossings.sort_unstable();
+        for pair in crossings.as_chunks::<2>().0 {
+            kept.extend(Edge::for_fronts([pair[0], end], [pair[1], end]));
+        }
+        kept.sort();
+        kept
+    }
 }
 
 /// The knots between spans of different width.
@@ -176,10 +299,11 @@ fn parameter(axis: &ParameterSpans, place: i32) -> f64 {
 
 /// The line that meets most edges, and how many.
 fn most_met(edges: &[Edge]) -> (i32, usize) {
-    let mut ends: Vec<i32> = edges.iter().map(|edge| edge.side[1]).collect();
+    let crossed = || edges.iter().filter(|edge| edge.side[0] < edge.side[1]);
+    let mut ends: Vec<i32> = crossed().map(|edge| edge.side[1]).collect();
     ends.sort_unstable();
     let (mut ended, mut most) = (0, (0, 0));
-    for (index, edge) in edges.iter().enumerate() {
+    for (index, edge) in crossed().enumerate() {
         let [side, _] = edge.side;
         while ends[ended] <= side {
             ended += 1;

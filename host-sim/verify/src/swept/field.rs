@@ -62,8 +62,7 @@ pub fn height_field(
     let missed = MISSED_RADII * oracle.radius_mm;
     let at = |[u, v]: [f64; 2]| -> Option<(FieldPoint, f64)> {
         // Beside a region's boundary the last ball stands at the end of a pass.
-        let half_mm = 0.5 * oracle.contact(u, v).map_or(0.0, |contact| contact.step_over_mm);
-        if oracle.region.is_some() && !oracle.is_deep_in_region(u, v, half_mm) {
+        if !oracle.is_served(u, v) {
             return None;
         }
         let at = oracle.surface.at(u, v);

@@ -26,6 +26,11 @@ const REQUIRED_SHARE: f64 = 0.5 * super::ERROR_SHARE_MAX;
 /// Heights are equal within this share of the gap's largest, or within this, mm: the rounding of centres to nanometres.
 const EQUAL_SHARE: f64 = 1e-4;
 const EQUAL_MM: f64 = 2e-6;
+/// Parts of a gap between curved passes by which those within a region are found, halvings to their ends, and places across.
+const SERVED_PARTS: u32 = 64;
+const SERVED_HALVINGS: u32 = 12;
+const SERVED_SHARES: [f64; 3] = [0.1, 0.5, 0.9];
+
 /// A crest lowered by another part of the path to less than this below the surface, mm, is not searched further.
 const GOUGED_MM: f64 = 1e-4;
 /// Largest number of iterations of the crest search; three or four are usual.
@@ -137,7 +142,7 @@ impl<'a> Gap<'a> {
 
     /// All gaps between passes: each pass and the next one, or of curved passes that which is next to it at each path parameter.
     pub(super) fn all(oracle: &'a Oracle, heights: &[PassHeight<'a>], tree: &'a PathTree<'a>) -> Vec<Self> {
-        if oracle.region.is_some() {
+        if oracle.region.is_some() && !oracle.spacing.is_constant() {
             return Self::within_region(oracle, heights, tree);
         }
         if !oracle.spacing.is_constant() {
@@ -175,8 +180,56 @@ impl<'a> Gap<'a> {
         found.sort_by(|a, b| a.0.cmp(&b.0).then(a.1[0].total_cmp(&b.1[0])));
         found
             .into_iter()
-            .map(|(pair, range)| Self::new(oracle, pair.map(|k| heights[k]), pair, Some(range), tree))
+            .flat_map(|(pair, range)| {
+                let whole = Self::new(oracle, pair.map(|k| heights[k]), pair, Some(range), tree);
+                let ranges = if oracle.region.is_some() {
+                    whole.served(range)
+                } else {
+                    vec![range]
+                };
+                ranges
+                    .into_iter()
+                    .map(move |range| Self::new(oracle, pair.map(|k| heights[k]), pair, Some(range), tree))
+            })
             .collect()
+    }
+
+    /// The parts of a range of the path in which the gap between two curved passes is in the region, away from its boundary.
+    fn served(&self, [low, high]: [f64; 2]) -> Vec<[f64; 2]> {
+        let is_served = |path: f64| {
+            let at = |share: f64| self.oracle.swapped(path, self.side(path, share));
+            SERVED_SHARES
+                .iter()
+                .all(|share| self.oracle.is_served(at(*share).0, at(*share).1))
+        };
+        let place = |k: u32| low + (high - low) * f64::from(k) / f64::from(SERVED_PARTS);
+        let edge = |mut outside: f64, mut inside: f64| {
+            for _ in 0..SERVED_HALVINGS {
+                let middle = 0.5 * (outside + inside);
+                if is_served(middle) {
+                    inside = middle;
+                } else {
+                    outside = middle;
+                }
+            }
+            inside
+        };
+        let mut ranges: Vec<[f64; 2]> = Vec::new();
+        let mut start = is_served(low).then_some(low);
+        for k in 1..=SERVED_PARTS {
+            let (before, at) = (place(k - 1), place(k));
+            match (start, is_served(at)) {
+                (None, true) => start = Some(edge(before, at)),
+                (Some(from), false) => {
+                    ranges.push([from, edge(at, before)]);
+                    start = None;
+                }
+                _ => {}
+            }
+        }
+        ranges.extend(start.map(|from| [from, high]));
+        ranges.retain(|[from, to]| from < to);
+        ranges
     }
 
     /// The gaps of a region: between the passes of neighbouring lines, where they are beside each other. Beside the region's boundary the last ball stands at the end

@@ -3,6 +3,7 @@
 mod curve;
 mod measuring;
 mod stepping;
+mod within;
 
 use core::ops::DerefMut;
 
@@ -43,6 +44,9 @@ enum Task {
     Clear,
     /// Step at each station and in the middle of each interval.
     Step,
+    /// Give stations where the surface is not evaluated the steps beside them.
+    FillForwards,
+    FillBackwards,
     /// A straight front at the least step, in place of the limits.
     Level,
     /// The current front, moved.
@@ -118,6 +122,11 @@ pub(crate) struct Advance {
     length_mm: f32,
     /// Greatest advance, as a share of the whole side parameter.
     advanced: f32,
+    /// Path of the region, places; the stations around it, and those that are stepped; some of them could not be.
+    extent: Option<[i32; 2]>,
+    within: [u16; 2],
+    stepped: [u16; 2],
+    has_gaps: bool,
     /// The passes' ends are poles.
     poles: [bool; 2],
     /// The boundary ahead is a single point, which every station comes to, or none.
@@ -172,6 +181,10 @@ impl Advance {
         before: None,
         length_mm: 0.0,
         advanced: 0.0,
+        extent: None,
+        within: [0; 2],
+        stepped: [0; 2],
+        has_gaps: false,
         poles: [false; 2],
         is_point_ahead: false,
         approach: Approach::Reaches,
@@ -187,6 +200,7 @@ impl Advance {
         self.made = None;
         self.station = 0;
         if is_first {
+            self.extent = None;
             self.cursor = cursor;
             self.patch.forget();
             self.advanced = 0.0;
@@ -223,6 +237,7 @@ impl Advance {
         self.is_shifted = false;
         self.fault = None;
         (self.approach, self.is_covered) = (Approach::Reaches, true);
+        self.has_gaps = false;
         self.foot.begin((0, 0));
     }
 
@@ -266,7 +281,13 @@ impl Advance {
             Task::Length | Task::Ahead => cost::LENGTH,
             Task::Step => cost::of(&cost::STEP, self.foot.next),
             Task::Crest => cost::of(&cost::CREST, self.search.next),
-            Task::Clear | Task::Apply | Task::Level | Task::Shift | Task::Point => cost::COPY,
+            Task::Clear
+            | Task::Apply
+            | Task::Level
+            | Task::Shift
+            | Task::Point
+            | Task::FillForwards
+            | Task::FillBackwards => cost::COPY,
             Task::Forwards | Task::Backwards | Task::Compare | Task::Lower | Task::Eliminate => cost::SWEEP,
             Task::Hull => cost::HULL,
             Task::Substitute => cost::SUBSTITUTE,
@@ -336,16 +357,15 @@ impl Advance {
             }
             Task::Step => {
                 let [least, most] = self.steps.map(to_f32);
+                let [from, to] = self.stepped;
                 self.is_short = self.is_whole
-                    && self.front_mm < self.period_mm * to_f32(i32::from(count.saturating_sub(1)));
-                self.is_level = self.is_straight && most <= LEVEL * least && !self.is_short;
-                let next = if self.is_level || self.is_short {
-                    Task::Level
-                } else {
-                    Task::Forwards
-                };
-                (next, 0)
+                    && self.front_mm < self.period_mm * to_f32(i32::from(to.saturating_sub(from)));
+                let is_even = most > 0.0 && most <= LEVEL * least;
+                self.is_level = self.is_straight && is_even && !self.is_short;
+                (self.after_steps(self.has_gaps), 0)
             }
+            Task::FillForwards => (Task::FillBackwards, 0),
+            Task::FillBackwards => (self.after_steps(false), 0),
             Task::Level | Task::Shift | Task::Point => (Task::Eliminate, 0),
             Task::Forwards => (Task::Backwards, 0),
             Task::Backwards => {
@@ -444,6 +464,8 @@ impl Advance {
                 self.at_poles(table, station);
             }
             Task::Lower => self.lower(table, station),
+            Task::FillForwards => self.fill(table, station, station.checked_sub(1)),
+            Task::FillBackwards => self.fill(table, backwards, Some(backwards.saturating_add(1))),
             Task::Level => {
                 let [least, _] = self.steps;
                 let more = if self.is_level { LEVEL_MORE } else { 1.0 };

@@ -16,6 +16,8 @@ pub(crate) const SUBSTITUTE: u32 = 10_400;
 
 /// Stations of a front, in search for its parts, a chunk.
 pub(crate) const PART: u32 = 7_500;
+/// Edges of a region against a front, a chunk.
+pub(crate) const CLIP: u32 = 9_000;
 
 /// Cycles of an evaluation; those after the last one are the last.
 pub(crate) const fn of<const N: usize>(evaluations: &[u32; N], number: u8) -> u32 {

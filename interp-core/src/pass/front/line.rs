@@ -5,7 +5,7 @@ use crate::job::stations::Stations;
 use crate::math::arith::{power_of_two, sqrt, to_f32, truncated};
 use crate::pass::front::side::{Direction, SideCursor, fine};
 use crate::pass::front::spline::Cubic;
-use crate::pass::front::table::{Column, Table};
+use crate::pass::front::table::{Column, Pair, Table};
 use crate::sample::SpanParameter;
 use crate::surface::SideCurve;
 
@@ -19,8 +19,8 @@ const BISECTIONS: u8 = 31;
 pub(crate) struct FrontLine {
     pub(super) direction: Direction,
     pub(super) stations: Stations,
-    /// The table's columns, see [`Table::new`].
-    pub(super) swapped: bool,
+    /// Its columns in the table.
+    pub(super) pair: Pair,
     /// A span of the side parameter.
     pub(super) cursor: SideCursor,
     /// Whether start and end of the pass are on the last side boundary.
@@ -60,7 +60,7 @@ impl FrontPiece {
 
 impl FrontLine {
     fn cubic(&self, job: &Job<'_>, interval: u16) -> Cubic {
-        let table = Table::new(job.rest(), self.stations, self.swapped);
+        let table = Table::new(job.rest(), self.stations, [self.pair; 2]);
         let length = self.stations.length(job, interval);
         Cubic::of(&table, [Column::Front, Column::Slope], interval, length)
     }
@@ -233,7 +233,17 @@ impl FrontLine {
 impl Cubic {
     /// Places within the interval at which the cubic has an extremum.
     pub(super) fn extrema(&self) -> [Option<i32>; 2] {
-        let [a, b, c] = [3.0 * to_f32(self.third), to_f32(self.second), to_f32(self.first)];
+        self.extrema_over(0.0)
+    }
+
+    /// Places within the interval at which its height over a line has an extremum, by the line's rise over the interval.
+    pub(super) fn extrema_over(&self, rise: f32) -> [Option<i32>; 2] {
+        let rise = rise * power_of_two(self.shift.cast_signed());
+        let [a, b, c] = [
+            3.0 * to_f32(self.third),
+            to_f32(self.second),
+            to_f32(self.first) - rise,
+        ];
         // a t^2 + 2 b t + c
         let root = b * b - a * c;
         if !(root >= 0.0) {

@@ -24,9 +24,11 @@
 //! | [`cost`] | cycles of the portions |
 //! | [`line`] | a pass on a front, and its pieces |
 //! | [`part`] | the parts of a front before the boundary |
+//! | [`clip`] | those within a region |
 //! | [`sequence`] | the passes in order |
 
 mod advance;
+mod clip;
 mod cost;
 mod crest;
 mod foot;

@@ -7,7 +7,7 @@ use crate::job::stations::Stations;
 use crate::pass::front::line::FrontLine;
 use crate::pass::front::side::{Direction, SideCursor, fine};
 use crate::pass::front::spline::Cubic;
-use crate::pass::front::table::{Column, Table};
+use crate::pass::front::table::{Column, Pair, Table};
 use crate::pass::route::Route;
 use crate::sample::SpanParameter;
 
@@ -25,6 +25,8 @@ enum Stage {
     Within,
     /// Stations beyond the boundary, behind the part.
     Behind,
+    /// Stations of a part whose ends are known, up to this one.
+    Known(u16),
     Found,
 }
 
@@ -32,8 +34,8 @@ enum Stage {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PartSearch {
     stage: Stage,
-    /// The front's columns are the first ones, swapped; it is travelled backwards.
-    pub(crate) swapped: bool,
+    /// The front's columns; it is travelled backwards.
+    pub(crate) pair: Pair,
     reversed: bool,
     direction: Direction,
     cursor: SideCursor,
@@ -53,7 +55,7 @@ pub(crate) struct PartSearch {
 impl PartSearch {
     pub(crate) const IDLE: Self = Self {
         stage: Stage::Idle,
-        swapped: false,
+        pair: 0,
         reversed: false,
         direction: Direction::FROM_EDGE,
         cursor: SideCursor::NONE,
@@ -73,12 +75,26 @@ impl PartSearch {
         direction: Direction,
         cursor: SideCursor,
         reversed: bool,
-        swapped: bool,
+        pair: Pair,
     ) {
         *self = Self::IDLE;
         (self.direction, self.cursor) = (direction, cursor);
-        (self.reversed, self.swapped) = (reversed, swapped);
+        (self.reversed, self.pair) = (reversed, pair);
         self.stage = Stage::Before;
+    }
+
+    /// Looks at the part of the front between two places, the first one in the order of travel first, and the stations within it, ascending.
+    pub(crate) const fn know(&mut self, [start, end]: [SpanParameter; 2], [low, high]: [u16; 2], count: u16) {
+        (self.start, self.end) = (start, end);
+        (self.pieces, self.span) = (1, None);
+        let [from, to] = if self.reversed {
+            let last = count.saturating_sub(1);
+            [last.saturating_sub(high), last.saturating_sub(low)]
+        } else {
+            [low, high]
+        };
+        self.index = from;
+        self.stage = Stage::Known(to);
     }
 
     pub(crate) const fn stop(&mut self) {
@@ -102,7 +118,7 @@ impl PartSearch {
         let front = FrontLine {
             direction: self.direction,
             stations,
-            swapped: self.swapped,
+            pair: self.pair,
             cursor,
             are_on_boundary: self.are_on_boundary,
             pieces: self.pieces,
@@ -114,6 +130,7 @@ impl PartSearch {
                 side: SpanParameter { span: 0, fraction: 0 },
                 reversed: self.reversed,
                 ends: [self.start, self.end],
+                joins: false,
                 front: Some(front),
             })
         };
@@ -128,7 +145,7 @@ impl PartSearch {
         for _ in 0..CHUNK {
             match self.stage {
                 Stage::Idle | Stage::Found => return,
-                Stage::Before | Stage::Within | Stage::Behind => self.look(job, table),
+                Stage::Before | Stage::Within | Stage::Behind | Stage::Known(_) => self.look(job, table),
             }
         }
     }
@@ -171,14 +188,13 @@ impl PartSearch {
                 self.are_on_boundary = [is_from_boundary, false];
                 self.stage = Stage::Within;
             }
-            Stage::Within if is_before => {
-                self.cursor.seek(job, &self.direction, fine(front));
-                let span = self.cursor.span();
-                let crossed = self.span.map_or(0, |last| span.abs_diff(last));
-                self.span = Some(span);
-                self.pieces = self.pieces.saturating_add(1 + crossed);
-                self.index += 1;
+            Stage::Within if is_before => self.count(job, front),
+            Stage::Known(last) if is_over || index > last => {
+                // The next part is to be named.
+                self.is_last = true;
+                self.stage = Stage::Found;
             }
+            Stage::Known(_) => self.count(job, front),
             Stage::Within => {
                 let [is_from_boundary, _] = self.are_on_boundary;
                 self.are_on_boundary = [is_from_boundary, !is_over];
@@ -196,5 +212,15 @@ impl PartSearch {
             Stage::Before | Stage::Behind => self.index += 1,
             Stage::Idle | Stage::Found => {}
         }
+    }
+
+    /// Counts the piece behind a station.
+    fn count(&mut self, job: &Job<'_>, front: i32) {
+        self.cursor.seek(job, &self.direction, fine(front));
+        let span = self.cursor.span();
+        let crossed = self.span.map_or(0, |last| span.abs_diff(last));
+        self.span = Some(span);
+        self.pieces = self.pieces.saturating_add(1 + crossed);
+        self.index += 1;
     }
 }

@@ -1,5 +1,7 @@
 //! The passes of a job of constant scallop height in order, from the first line over the parts of the fronts to the last line.
 
+mod in_region;
+
 use crate::fault::{Fault, FaultKind, Result};
 use crate::job::program::Job;
 use crate::job::{Pattern, Spacing};
@@ -8,9 +10,11 @@ use crate::pass::front::advance::{Advance, Made};
 use crate::pass::front::cost;
 use crate::pass::front::part::PartSearch;
 use crate::pass::front::side::{Direction, SideCursor, fine};
-use crate::pass::front::table::Table;
+use crate::pass::front::table::{Pair, Table, free_pair};
+use crate::pass::lines::RegionLines;
 use crate::pass::route::Route;
 use crate::sample::SpanParameter;
+use in_region::InRegion;
 
 /// Cycles of the planning in a period of 1 ms, a share of the period; never less than one portion, nor more than in 1 ms.
 const PORTION_CYCLES: f32 = 23_500.0;
@@ -43,8 +47,9 @@ pub(crate) enum NextRoute {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FrontSequence {
     line: Line,
-    /// The table's columns of the front before the next one and of the next one are swapped.
-    swapped: bool,
+    /// Columns of the front that the tool is on, or was last, and of the latest one, from which the next is made. They differ behind fronts that hold no pass.
+    on: Pair,
+    from: Pair,
     /// Part of the surface, from 0, and fronts so far.
     part: u8,
     fronts: u32,
@@ -59,12 +64,14 @@ pub(crate) struct FrontSequence {
     /// The other part of the surface follows.
     begins_part: bool,
     advance: Advance,
+    region: InRegion,
 }
 
 impl FrontSequence {
     pub(crate) const START: Self = Self {
         line: Line::First,
-        swapped: false,
+        on: 0,
+        from: 0,
         part: 0,
         fronts: 0,
         direction: Direction::FROM_EDGE,
@@ -74,19 +81,26 @@ impl FrontSequence {
         is_ahead: false,
         begins_part: false,
         advance: Advance::START,
+        region: InRegion::NONE,
     };
 
     /// Ends the work.
     pub(crate) const fn stop(&mut self) {
         self.advance.stop();
         self.part_search.stop();
+        self.region = InRegion::NONE;
     }
 
     /// Begins, with the first pass.
-    pub(crate) fn start(&mut self, job: &Job<'_>) -> Route {
+    pub(crate) fn start(&mut self, job: &Job<'_>, lines: &mut RegionLines) -> Route {
         self.cursor = SideCursor::new(job);
-        (self.fronts, self.swapped) = (0, false);
+        (self.on, self.from, self.fronts) = (0, 0, 0);
         (self.is_ahead, self.begins_part) = (false, false);
+        self.is_last_part = true;
+        self.region = InRegion::NONE;
+        if let Some(route) = self.start_in_region(job, lines) {
+            return route;
+        }
         // A front that moves backwards is travelled as the second part from the middle is.
         (self.part, self.direction) = match job.header.spacing {
             Spacing::ConstantFromMiddle => {
@@ -105,51 +119,69 @@ impl FrontSequence {
 
     /// Whether [`Self::plan`] has anything to do.
     pub(crate) fn has_work(&self) -> bool {
-        self.part_search.has_work() || self.advance.has_work()
+        self.part_search.has_work() || self.region.has_work() || self.advance.has_work()
     }
 
     /// Most cycles of the next portion; 0 where there is none.
     pub(crate) const fn cycles(&self) -> u32 {
         if self.part_search.has_work() {
             cost::PART
+        } else if self.region.has_work() {
+            cost::CLIP
         } else {
             self.advance.cycles()
         }
     }
 
     /// A portion of the next front, into the words behind the job's. Returns its cycles.
-    pub(crate) fn work(&mut self, job: &Job<'_>, words: &mut [i32]) -> u32 {
+    pub(crate) fn work(&mut self, job: &Job<'_>, words: &mut [i32], lines: &mut RegionLines) -> u32 {
         let stations = self.advance.stations();
         if self.part_search.has_work() {
-            let table = Table::new(&*words, stations, self.part_search.swapped);
+            let table = Table::new(&*words, stations, [self.part_search.pair; 2]);
             self.part_search.work(job, &table);
             return cost::PART;
         }
-        let mut table = Table::new(&mut *words, stations, self.swapped);
+        if self.region.has_work() {
+            self.work_in_region(job, words, lines);
+            return cost::CLIP;
+        }
+        let pairs = [self.from, self.next_pair()];
+        let mut table = Table::new(&mut *words, stations, pairs);
         let cycles = self.advance.work(job, &mut table);
         self.seek_first_part(job);
         cycles
     }
 
+    /// Columns of the front that is made.
+    const fn next_pair(&self) -> Pair {
+        free_pair([self.on, self.from])
+    }
+
     /// Begins the search for the first part of the front that is made, once no part of the one before is left.
     fn seek_first_part(&mut self, job: &Job<'_>) {
         let is_made = matches!(self.advance.made(), Some(Ok(Made::Front)));
-        if is_made && !self.is_ahead && self.needs_front() && self.part_search.is_idle() {
+        if !is_made || self.is_ahead || !self.needs_front() {
+            return;
+        }
+        if self.region.is_used() {
+            self.region.clip_front();
+        } else if self.part_search.is_idle() {
             let part = if self.begins_part { 1 } else { self.part };
             let reversed = is_reversed(job.header.pattern, self.fronts.wrapping_add(1), part);
             self.part_search
-                .begin(self.advance.direction, self.cursor, reversed, !self.swapped);
+                .begin(self.advance.direction, self.cursor, reversed, self.next_pair());
         }
     }
 
     /// Whether the pass after the latest one is another part of its front, and found.
     pub(crate) const fn has_part(&self) -> bool {
-        matches!(self.line, Line::Front) && !self.is_last_part && self.part_search.is_found()
+        let is_known = self.part_search.is_found() || self.region.is_on_line();
+        !self.is_last_part && is_known
     }
 
     /// The planning of one period of a job without limits, of which some cycles are spent already.
     #[inline(never)]
-    pub(crate) fn plan(&mut self, job: &Job<'_>, words: &mut [i32], spent: u32) {
+    pub(crate) fn plan(&mut self, job: &Job<'_>, words: &mut [i32], lines: &mut RegionLines, spent: u32) {
         let share = (job.header.period_s / PORTION_PERIOD_S).at_most(1.0);
         let real = |cycles: u32| f32::from(u16::try_from(cycles).unwrap_or(u16::MAX));
         let mut left = share * PORTION_CYCLES - real(spent);
@@ -158,7 +190,7 @@ impl FrontSequence {
             if most == 0.0 || (most > left && portion > 0) {
                 return;
             }
-            left -= real(self.work(job, words));
+            left -= real(self.work(job, words, lines));
         }
     }
 
@@ -178,9 +210,10 @@ impl FrontSequence {
         }
         self.is_ahead = false;
         match self.line {
-            Line::First => {}
+            Line::First => self.begin_cell(),
             Line::Front => {
-                self.swapped = !self.swapped;
+                self.on = self.next_pair();
+                self.from = self.on;
                 self.advance.go_on();
             }
             Line::Last if self.begins_part => {
@@ -195,22 +228,29 @@ impl FrontSequence {
     /// Whether the pass after the latest one is on another front.
     pub(crate) const fn needs_front(&self) -> bool {
         match self.line {
-            Line::First => true,
-            Line::Front => self.is_last_part,
+            Line::First | Line::Front => self.is_last_part,
             Line::Last => self.begins_part,
         }
     }
 
     /// Whether the latest pass is the last one.
     pub(crate) const fn is_over(&self) -> bool {
-        matches!(self.line, Line::Last) && !self.begins_part
+        let is_last_line = match self.line {
+            Line::First => self.region.is_flat(),
+            Line::Front => false,
+            Line::Last => !self.begins_part,
+        };
+        is_last_line && self.is_last_part && !self.region.goes_on()
     }
 
     /// The pass after the latest one, which becomes the latest.
     ///
     /// # Errors
     /// [`FaultKind::IntervalTooSmall`] where the front does not move.
-    pub(crate) fn next(&mut self, job: &Job<'_>) -> Result<NextRoute> {
+    pub(crate) fn next(&mut self, job: &Job<'_>, lines: &mut RegionLines) -> Result<NextRoute> {
+        if self.region.is_used() {
+            return self.next_in_region(job, lines);
+        }
         if self.line == Line::Front && !self.is_last_part {
             return self.take_part(job);
         }

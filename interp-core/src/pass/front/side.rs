@@ -1,11 +1,12 @@
 //! The side parameter as one integer over all spans, [`WHOLE`] from boundary to boundary, and the direction in which fronts move over it.
 
 use crate::job::program::Job;
-use crate::math::arith::{power_of_two, to_f32, truncated};
+use crate::job::region::{FRONT_SIDE_BITS, front_side_scale, front_side_width};
+use crate::math::arith::{power_of_two, to_f32};
 use crate::sample::SpanParameter;
 
 /// The whole side parameter.
-pub(crate) const WHOLE: i32 = 1 << 28;
+pub(crate) const WHOLE: i32 = 1 << FRONT_SIDE_BITS;
 /// The unit as a share of the whole.
 pub(crate) const UNIT: f32 = power_of_two(-28);
 
@@ -60,6 +61,24 @@ impl Direction {
             end: WHOLE / 2,
         },
     ];
+
+    /// From the first line of a cell of a region to its last one.
+    pub(crate) const fn over(first: i32, last: i32) -> Self {
+        Self {
+            origin: first,
+            forwards: true,
+            end: last - first,
+        }
+    }
+
+    /// Distance of a side parameter from the first front.
+    pub(crate) const fn distance(&self, side: i32) -> i32 {
+        if self.forwards {
+            side - self.origin
+        } else {
+            self.origin - side
+        }
+    }
 
     /// Fronts are followed beyond the boundary up to here.
     pub(crate) const fn cap(&self) -> i32 {
@@ -120,7 +139,7 @@ impl SideCursor {
             sum += job.side_width(span);
         }
         let mut cursor = Self {
-            scale: to_f32(WHOLE) / sum,
+            scale: front_side_scale(sum),
             ..Self::NONE
         };
         cursor.width = cursor.width_of(job, 0);
@@ -132,7 +151,7 @@ impl SideCursor {
         if span + 1 >= job.header.side_spans {
             return WHOLE.saturating_sub(self.start).max(1);
         }
-        truncated(job.side_width(span) * self.scale).max(1)
+        front_side_width(job.side_width(span), self.scale)
     }
 
     pub(crate) const fn span(&self) -> u16 {
@@ -156,7 +175,7 @@ impl SideCursor {
             self.width = self.width_of(job, self.span);
         } else if !behind && self.span > 0 {
             self.span -= 1;
-            self.width = truncated(job.side_width(self.span) * self.scale).max(1);
+            self.width = front_side_width(job.side_width(self.span), self.scale);
             self.start = self.start.saturating_sub(self.width);
         }
     }

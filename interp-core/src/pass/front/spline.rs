@@ -185,8 +185,8 @@ mod tests {
     #[test]
     fn a_cubic_between_stations() {
         let stations = Stations::most(1);
-        let mut words = vec![0; stations.words()];
-        let mut table = Table::new(words.as_mut_slice(), stations, false);
+        let mut words = vec![0; stations.words(false)];
+        let mut table = Table::new(words.as_mut_slice(), stations, [0, 1]);
         let (low, high) = (3_000_000, 7_500_001);
         table.set_word(Column::Front, 4, low);
         table.set_word(Column::Front, 5, high);

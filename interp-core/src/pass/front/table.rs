@@ -7,6 +7,18 @@ use crate::job::stations::Stations;
 /// Mark of an interval whose crests, within it and at the end of the pass, are not measured.
 pub(crate) const UNMEASURED: i32 = 3;
 
+/// Columns of one front, its distances and slopes, by their number: up to 2, the last one in jobs with a region only.
+pub(crate) type Pair = u8;
+
+/// A pair other than these, the first one.
+pub(crate) const fn free_pair(used: [Pair; 2]) -> Pair {
+    match used {
+        [0, 1] | [1, 0] => 2,
+        [0, _] | [_, 0] => 1,
+        _ => 0,
+    }
+}
+
 /// A column of the table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Column {
@@ -35,21 +47,30 @@ pub(crate) enum Column {
     Mark,
 }
 
+/// A column of a pair.
+const fn column_of(pair: Pair, slope: usize) -> usize {
+    match pair {
+        0 => slope,
+        1 => 2 + slope,
+        _ => Column::Mark as usize + 1 + slope,
+    }
+}
+
 /// The table: for reading in the tick, for writing in the planning.
 #[derive(Debug)]
 pub(crate) struct Table<W> {
     words: W,
     stations: Stations,
-    /// The columns of the current front and of the next one are swapped.
-    swapped: bool,
+    /// The columns of the current front and of the next one.
+    pairs: [Pair; 2],
 }
 
 impl<W: Deref<Target = [i32]>> Table<W> {
-    pub(crate) const fn new(words: W, stations: Stations, swapped: bool) -> Self {
+    pub(crate) const fn new(words: W, stations: Stations, pairs: [Pair; 2]) -> Self {
         Self {
             words,
             stations,
-            swapped,
+            pairs,
         }
     }
 
@@ -58,11 +79,13 @@ impl<W: Deref<Target = [i32]>> Table<W> {
     }
 
     const fn index(&self, column: Column, station: u16) -> usize {
-        let column = column as usize;
-        let column = if self.swapped && column < 4 {
-            column ^ 2
-        } else {
-            column
+        let [current, next] = self.pairs;
+        let column = match column {
+            Column::Front => column_of(current, 0),
+            Column::Slope => column_of(current, 1),
+            Column::Next => column_of(next, 0),
+            Column::NextSlope => column_of(next, 1),
+            other => other as usize,
         };
         column * self.stations.count() as usize + station as usize
     }

@@ -80,7 +80,7 @@ impl Run {
             }
             let next = match self.next_route.take() {
                 Some(route) => NextRoute::Pass(route),
-                None => fronts.next(job)?,
+                None => fronts.next(job, &mut self.lines)?,
             };
             if let NextRoute::Pass(_) = next {
                 fronts.arrive();
@@ -147,7 +147,7 @@ impl Run {
     /// front in the words behind the job's.
     pub(crate) fn plan(&mut self, job: &Job<'_>, rest: &mut [i32], spent: u32) {
         let has_work = match &mut self.planning {
-            PassPlanning::Fronts(fronts) => return fronts.plan(job, rest, spent),
+            PassPlanning::Fronts(fronts) => return fronts.plan(job, rest, &mut self.lines, spent),
             PassPlanning::Scan(scan) if job.header.spacing == Spacing::Exact => {
                 scan.plan(job);
                 scan.has_work()
@@ -284,7 +284,7 @@ impl Run {
     /// Makes a portion of the next front, in the words behind the job's. Returns its cycles.
     pub(crate) fn make_front(&mut self, job: &Job<'_>, rest: &mut [i32]) -> u32 {
         match &mut self.planning {
-            PassPlanning::Fronts(fronts) => fronts.work(job, rest),
+            PassPlanning::Fronts(fronts) => fronts.work(job, rest, &mut self.lines),
             PassPlanning::Scan(_) => 0,
         }
     }
@@ -295,7 +295,7 @@ impl Run {
     /// As [`FrontSequence::next`].
     pub(crate) fn next_pass(&mut self, job: &Job<'_>) -> Result<NextRoute> {
         match &mut self.planning {
-            PassPlanning::Fronts(fronts) => fronts.next(job),
+            PassPlanning::Fronts(fronts) => fronts.next(job, &mut self.lines),
             PassPlanning::Scan(_) => Ok(NextRoute::None),
         }
     }
@@ -368,7 +368,7 @@ impl Run {
     /// The first pass.
     pub(crate) fn first_route(&mut self, job: &Job<'_>) -> Route {
         if let PassPlanning::Fronts(fronts) = &mut self.planning {
-            return fronts.start(job);
+            return fronts.start(job, &mut self.lines);
         }
         let of_region = self.lines.take(job.header);
         of_region.unwrap_or_else(|| Route::of_pass(job.header, 0, SpanParameter::default()))

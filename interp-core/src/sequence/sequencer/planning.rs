@@ -360,8 +360,13 @@ impl Sequencer {
             Planning::Feed => {
                 // The pass after it takes as long to plan; off the surface it can be waited for.
                 let is_last = next.is_last && !self.planner.is_walking();
-                let is_on_surface = if job.header.spacing.is_constant() {
+                let is_on_surface = if job.header.spacing.is_constant() && job.header.edges == 0 {
                     job.header.pattern == Pattern::Zigzag
+                } else if job.header.spacing.is_constant() {
+                    // The next pass may be joined along a boundary; what reaches one says so.
+                    let [_, at_boundary] = next.route.reach_boundaries(job);
+                    let is_joined = job.header.pattern == Pattern::Zigzag && at_boundary;
+                    is_joined || job.link_to(next.pass.wrapping_add(1), axes).is_low()
                 } else {
                     next.steps_over || job.link_to(next.pass.wrapping_add(1), axes).is_low()
                 };
@@ -463,7 +468,8 @@ impl Sequencer {
     fn choose_link(&mut self, job: &Job<'_>) {
         self.has_to_choose = false;
         let (now, next) = both(&mut self.plans, self.second);
-        now.steps_over = job.header.pattern == Pattern::Zigzag && now.is_beside(next, job);
+        let may_step = job.header.edges == 0 || next.route.joins;
+        now.steps_over = job.header.pattern == Pattern::Zigzag && may_step && now.is_beside(next, job);
         if now.steps_over {
             self.step_over.request();
             self.has_step_over = true;

@@ -25,7 +25,7 @@ impl Advance {
         table: &mut Table<W>,
         station: u16,
     ) {
-        if station + 1 >= self.stations.count() {
+        if station + 1 >= self.stations.count() || !self.is_interval_within(station) {
             return;
         }
         let length = self.stations.length(job, station);
@@ -112,8 +112,12 @@ impl Advance {
             self.is_sharp = false;
             self.is_next_straight = true;
             self.shift = i32::MAX;
-        } else {
+        } else if self.is_interval_within(station) {
             self.look_at_bend(job, table, station);
+        }
+        table.set_word(Column::Scratch, station, 0);
+        if !self.is_within(station) {
+            return;
         }
         self.is_next_straight &= table.real(Column::NextSlope, station) == 0.0;
         if next < self.direction.end {
@@ -128,7 +132,6 @@ impl Advance {
             let advance = to_f32(next.saturating_sub(front)) * UNIT;
             self.advanced = self.advanced.at_least(advance);
         }
-        table.set_word(Column::Scratch, station, 0);
     }
 
     /// Looks whether the curve turns too sharply at a station.

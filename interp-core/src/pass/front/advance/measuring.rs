@@ -69,7 +69,12 @@ impl Advance {
         let station = self.mark_of(number);
         let bit = if number < places { 1 } else { 2 };
         let is_middle = number.is_multiple_of(PLACES) || number >= places;
-        if table.word(Column::Mark, station) & bit == 0 {
+        let is_there = if number < places {
+            self.is_interval_within(station)
+        } else {
+            self.is_within(if number == places { 0 } else { station + 1 })
+        };
+        if table.word(Column::Mark, station) & bit == 0 || !is_there {
             return false;
         }
         let [low, high] = [station, station.saturating_add(1)].map(|at| table.word(Column::Front, at));

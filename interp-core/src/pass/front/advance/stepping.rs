@@ -29,7 +29,7 @@ const TANGENT_MAX: f32 = 5.671_282;
 /// Step where the surface is faulty, units of the fronts.
 const FAULTY_STEP: i32 = WHOLE / 256;
 /// Stations beside those before the boundary up to which a front is stepped: the spline through them forgets what lies farther away.
-const REACH: u16 = 8;
+pub(super) const REACH: u16 = 8;
 /// Squares of the derivatives' lengths, side to path, below which an end of the passes is a pole.
 const POLE_MAX: f32 = 1e-10;
 
@@ -38,7 +38,7 @@ impl Advance {
     pub(super) fn measure_length(&mut self, job: &Job<'_>) {
         let spans = job.header.path_spans;
         let number = self.station % LENGTH_POINTS;
-        let at = u64::from(number) * u64::from(spans) * (1 << 32) / u64::from(LENGTH_POINTS - 1);
+        let at = self.length_at(spans, number, LENGTH_POINTS - 1);
         let span = u16::try_from(at >> 32).unwrap_or(0);
         let path = if span >= spans {
             SpanParameter {
@@ -74,7 +74,7 @@ impl Advance {
         self.before = point;
         self.station += 1;
         if self.station == 2 * LENGTH_POINTS {
-            let longest = self.length_mm.at_least(self.advanced);
+            let longest = self.length_mm.at_least(self.advanced) * self.extent_inverse(spans);
             let header = job.header;
             let step = sqrt(8.0 * header.ball_radius_mm * header.scallop_mm);
             let period = header.feed_mm_s * header.period_s;
@@ -82,6 +82,7 @@ impl Advance {
             self.stations = Stations::for_intervals(spans, longest / interval);
             self.period_mm = period;
             self.limiter.turn_per_mm = (TURN_PER_PERIOD / period).at_most(1.0 / (RADIUS_STEPS * step));
+            self.choose_range();
             (self.task, self.station) = (Task::Ahead, 0);
         }
     }
@@ -110,9 +111,11 @@ impl Advance {
             let cap = self.direction.cap();
             if self.station & 1 == 1 {
                 table.set_word(Column::Middle, station, cap);
-            } else {
+            } else if self.is_stepped(station) {
                 table.set_word(Column::Next, station, cap);
                 table.set_word(Column::Mark, station, UNMEASURED);
+            } else {
+                self.leave_gap(table, station);
             }
             self.next_station(2 * count - 1);
         }
@@ -123,10 +126,10 @@ impl Advance {
 
     /// Whether the front is before the boundary at a station near this one.
     fn is_near<W: DerefMut<Target = [i32]>>(&self, table: &Table<W>, station: u16) -> bool {
-        let last = self.stations.count().saturating_sub(1);
-        let from = station.saturating_sub(REACH);
+        let [first, last] = self.within;
+        let from = station.saturating_sub(REACH).max(first);
         let to = station.saturating_add(REACH + 1).min(last);
-        (from..=to).any(|at| table.word(Column::Front, at) < self.direction.end)
+        self.is_stepped(station) && (from..=to).any(|at| table.word(Column::Front, at) < self.direction.end)
     }
 
     /// An evaluation of the step at a station, or in the middle of the interval after it.
@@ -151,6 +154,17 @@ impl Advance {
                 return;
             }
             Found::Front(front) => front,
+            // In a region the pass may be elsewhere.
+            Found::Faulty(fault) if self.extent.is_some() => {
+                self.fault = Some(fault);
+                if is_middle {
+                    table.set_word(Column::Middle, station, self.direction.cap());
+                } else {
+                    self.leave_gap(table, station);
+                }
+                self.end_step(count);
+                return;
+            }
             // The tool reports the fault where it reaches it.
             Found::Faulty(fault) => {
                 self.fault = Some(fault);
@@ -158,14 +172,17 @@ impl Advance {
             }
         };
         let own = front_at(table, station, is_middle, job);
-        self.line = self.line.min(front);
+        let is_within = self.is_within(station);
+        if is_within {
+            self.line = self.line.min(front);
+            self.is_whole &= own < self.direction.end;
+        }
         let front = if self.is_point_ahead {
             self.before_point(own, front)
         } else {
             front
         };
-        self.is_whole &= own < self.direction.end;
-        if own < self.direction.end {
+        if own < self.direction.end && is_within {
             let step = front.saturating_sub(own);
             let [least, most] = self.steps;
             self.steps = [least.min(step), most.max(step)];
@@ -176,6 +193,10 @@ impl Advance {
             table.set_word(Column::Next, station, front);
             table.set_word(Column::Mark, station, UNMEASURED);
         }
+        self.end_step(count);
+    }
+
+    fn end_step(&mut self, count: u16) {
         self.next_station(2 * count - 1);
         if self.task == Task::Step {
             self.foot.begin(self.step_place(self.station));
