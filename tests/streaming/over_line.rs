@@ -88,6 +88,8 @@ impl Write for Wire {
 
 struct Bench {
     job: Prepared,
+    /// Of the first session.
+    number: u32,
     board: Arc<Mutex<Box<Board<WORDS>>>>,
 }
 
@@ -121,6 +123,7 @@ impl Bench {
         assert!(job.words.len() > 2 * WORDS);
         Self {
             job,
+            number: 1,
             board: Arc::new(Mutex::new(Box::new(Board::new()))),
         }
     }
@@ -136,7 +139,7 @@ impl Bench {
     }
 
     fn loaded(&self, line: Line) -> Session {
-        let mut session = self.session(line, 1);
+        let mut session = self.session(line, self.number);
         make_ready(&mut session, &Setup::simulated(Configuration::DEFAULT)).unwrap();
         drive::upload(&mut session, &self.job, |_| {}).unwrap();
         session
@@ -197,6 +200,24 @@ fn a_second_run_begins_with_an_upload() {
         "{refused}"
     );
     bench.run(GOOD, true);
+}
+
+/// Faces of a part on one board, of which some are streamed: with a region, with turns, as a whole.
+#[test]
+fn faces_one_after_the_other() {
+    let small = prepare(&bumpy([3, 4], [2.5, 2.0], CUTS[4].0, CUTS[4].1)).unwrap();
+    assert!(small.header.window == 0 && small.words.len() < WORDS);
+    let board = Arc::new(Mutex::new(Box::new(Board::new())));
+    let streamed = [Bench::of_region(), Bench::with_turns()].map(|bench| bench.job);
+    let [region, turns] = &streamed;
+    for (job, number) in [&small, region, turns, &small, region].into_iter().zip(1..) {
+        let bench = Bench {
+            number,
+            job: job.clone(),
+            board: board.clone(),
+        };
+        bench.run(GOOD, true);
+    }
 }
 
 /// One byte in a hundred is dropped, both ways.

@@ -9,7 +9,7 @@ use super::trim::{Polygon, trim};
 use super::{CadError, Face, Outline, Surface, outline};
 use job::{NurbsSpec, SurfaceSpec};
 use job_file::{TOLERANCE_DEFAULT_MM, TOLERANCE_MAX_MM};
-use machine::prepare::patch_count;
+use machine::prepare::{patch_count, streamed_patch_count};
 
 /// Highest degree of the surface of a job.
 const DEGREE_EXACT: usize = 3;
@@ -99,9 +99,8 @@ fn nurbs(spline: &SplineSurface) -> NurbsSpec {
     }
 }
 
-/// Number of patches of this surface on the board, or the reason why it does not fit. Where it lies does not count: a job's `[placement]`
-/// moves it.
-fn patches(nurbs: &NurbsSpec) -> Result<usize, String> {
+/// This surface around the origin, for the number of its patches: where it lies does not count, a job's `[placement]` moves it.
+fn centred(nurbs: &NurbsSpec) -> SurfaceSpec {
     let mut centred = nurbs.clone();
     let poles = || nurbs.poles_mm.iter().flatten();
     for axis in 0..3 {
@@ -115,14 +114,14 @@ fn patches(nurbs: &NurbsSpec) -> Result<usize, String> {
             .flatten()
             .for_each(|pole| pole[axis] -= middle);
     }
-    patch_count(&SurfaceSpec::Nurbs(centred))
+    SurfaceSpec::Nurbs(centred)
 }
 
 /// Converts a face to the surface of a job.
 ///
 /// # Errors
 /// The boundary of the face is not known, open or crosses itself, and `untrimmed` is not set; it is unbounded; no fit within the tolerance is small enough for the
-/// board; the tolerance is out of range.
+/// board, and it has no exact form that can be streamed; the tolerance is out of range.
 pub fn machinable(file: &str, face: &Face, options: &Options) -> Result<MachinableFace, CadError> {
     let name = format!("face {} ({}, {})", face.number, face.entity, face.surface.kind());
     if !(options.tolerance_mm > 0.0 && options.tolerance_mm <= TOLERANCE_MAX_MM) {
@@ -235,27 +234,32 @@ fn converted(
     name: &str,
 ) -> Result<MachinableFace, CadError> {
     let mut why_fitted = "it has no exact form".to_owned();
+    let mut streamed = None;
     if let Some(spline) = exact(&face.surface, rectangle) {
         let degree = spline.axes.iter().map(|axis| axis.degree).max().unwrap_or(0);
         if degree <= DEGREE_EXACT {
             let nurbs = nurbs(&spline);
-            match patches(&nurbs) {
-                Ok(patches) => {
-                    return Ok(MachinableFace {
-                        nurbs,
-                        form: Form::Exact,
-                        outline: outline.clone(),
-                        trimmed: None,
-                        patches,
-                    });
+            let surface = centred(&nurbs);
+            let exact = |patches| MachinableFace {
+                nurbs,
+                form: Form::Exact,
+                outline: outline.clone(),
+                trimmed: None,
+                patches,
+            };
+            match patch_count(&surface) {
+                Ok(patches) => return Ok(exact(patches)),
+                Err(why) => {
+                    why_fitted = why;
+                    streamed = streamed_patch_count(&surface).ok().map(exact);
                 }
-                Err(why) => why_fitted = why,
             }
         } else {
             why_fitted = format!("its degree is {degree}, the core's at most {DEGREE_EXACT}");
         }
     }
-    fitted(file, face, options, outline, rectangle, why_fitted, name)
+    // What the store holds at once needs no host while it runs: a fit is taken before a larger surface.
+    fitted(file, face, options, outline, rectangle, why_fitted, name).or_else(|error| streamed.ok_or(error))
 }
 
 fn fitted(
@@ -291,7 +295,7 @@ fn fitted(
             ),
         })?;
         let nurbs = nurbs(&spline);
-        let patches = patches(&nurbs)
+        let patches = patch_count(&centred(&nurbs))
             .map_err(|still| too_fine(format!("of a fit within {} mm {still}", options.tolerance_mm)))?;
         Ok((spline, nurbs, patches))
     };

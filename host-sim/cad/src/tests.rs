@@ -457,6 +457,36 @@ fn rectangular(surface: &Surface, rectangle: [[f64; 2]; 2]) -> Face {
 }
 
 /// A closed tube of degree 5 about the z axis: periodic knots, uneven, of a period that is no round number.
+fn rough() -> SplineSurface {
+    // No smooth surface comes near its poles.
+    let knots = (0..3).map(|_| 0.0);
+    let inner = (0..=20).map(f64::from);
+    let axis = Axis {
+        degree: 3,
+        knots: knots.chain(inner).chain((0..3).map(|_| 20.0)).collect(),
+    };
+    let pole = |i: usize, j: usize| {
+        let (x, y) = (5.0 * i as f64, 5.0 * j as f64);
+        [x, y, 2.0 * (2.1 * x).sin() * (1.7 * y).cos(), 1.0]
+    };
+    let poles = (0..axis.poles()).map(|i| (0..axis.poles()).map(|j| pole(i, j)).collect());
+    SplineSurface {
+        poles: poles.collect(),
+        axes: [axis.clone(), axis],
+    }
+}
+
+/// A face of 400 patches that no fit makes fewer: it is taken as it is, and streamed.
+#[test]
+fn a_face_that_is_larger_than_the_store_is_streamed() {
+    let surface = Surface::Spline(rough());
+    let boundary = around(&surface, &[[0.0, 0.0], [20.0, 0.0], [20.0, 20.0], [0.0, 20.0]]);
+    let face = face(surface, vec![boundary], 1.0);
+    let made = machinable("rough", &face, &Options::default()).unwrap();
+    assert_eq!((made.form.clone(), made.patches), (Form::Exact, 400));
+    assert!(machine::prepare::patch_count(&made.spec()).is_err());
+}
+
 fn tube() -> SplineSurface {
     let spans = [0.7, 1.1, 0.9, 1.3, 0.8, 1.0, 1.2, 0.6].map(|width| width * PI / 10.0);
     let period: f64 = spans.iter().sum();

@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use interp_core::encode::{self, Bicubic, EncodeError};
 use interp_core::job::SPANS_MAX;
+use interp_core::job::stream::{DIGEST_WORDS, WINDOW_MIN};
 use interp_core::surface::{Edges, POLYNOMIAL_WORDS, RATIONAL_WORDS};
 use interp_core::{Header, RunStart, STORE_WORDS, SurfaceKind};
 
@@ -117,12 +118,31 @@ pub fn patch_count(surface: &SurfaceSpec) -> Result<usize, String> {
     let Records { words, path, side } = records(&source, Along::U).map_err(|no| no.what)?;
     let (path_spans, side_spans) = (path.len() - 1, side.len() - 1);
     let patches = path_spans * side_spans;
-    // The width of each span is a word, too. A larger surface is streamed, but a fit of a face is better made coarser.
+    // The width of each span is a word, too.
     if words.len() + path_spans + side_spans > STORE_WORDS {
         return Err(format!(
             "the surface takes {patches} patches, more than the board's store: about {} polynomial or {} rational ones",
             STORE_WORDS / (POLYNOMIAL_WORDS + 1),
             STORE_WORDS / (RATIONAL_WORDS + 1)
+        ));
+    }
+    Ok(patches)
+}
+
+/// Number of patches of a surface that is not revolved and is streamed, with passes along one of u and v at least.
+///
+/// # Errors
+/// A sentence with the reason for which the surface cannot be encoded or streamed.
+pub fn streamed_patch_count(surface: &SurfaceSpec) -> Result<usize, String> {
+    let source = Source::new(surface);
+    let Records { words, path, side } = records(&source, Along::U).map_err(|no| no.what)?;
+    let (path_spans, side_spans) = (path.len() - 1, side.len() - 1);
+    let patches = path_spans * side_spans;
+    let row = path_spans.min(side_spans) * (words.len() / patches) + DIGEST_WORDS;
+    let rows = STORE_WORDS.saturating_sub(path_spans + side_spans) / row;
+    if rows < usize::from(WINDOW_MIN) {
+        return Err(format!(
+            "the surface takes {path_spans} x {side_spans} patches, and the board's store holds {rows} rows of them"
         ));
     }
     Ok(patches)

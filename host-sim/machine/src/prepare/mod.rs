@@ -20,7 +20,7 @@ use job::{Along, AlongChoice, Job, JobError, StartChoice, SurfaceSpec};
 use patches::pieces::Source;
 
 pub(crate) use geometry::SurfaceEvaluator;
-pub use grid::patch_count;
+pub use grid::{patch_count, streamed_patch_count};
 pub use steps::{config as step_config, configuration};
 pub use stream::{PATCHES_MAX, streamed};
 
