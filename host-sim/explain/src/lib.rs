@@ -135,9 +135,9 @@ pub fn fault(fault: Fault) -> (String, &'static str) {
         ),
         FaultKind::BadPatch => (
             format!(
-                "patch {value} is outside the range in which its polynomials cannot overflow, or the edges of the region are wrong"
+                "patch {value} is outside the range in which its polynomials cannot overflow, or the edges of the region are wrong; in a run: pass {value} meets more than 32 edges of it"
             ),
-            "this is a defect of the host tool: please report the job",
+            "with spacing = \"constant\" within a region: write spacing = \"exact\", or cut the region into several jobs; else this is a defect of the host tool: please report the job",
         ),
         FaultKind::BadLength => (
             format!("the job's data have the wrong length; {value} words arrived"),
