@@ -4,7 +4,7 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::path::Path;
 
-use job::{Job, NurbsSpec, Side, Spacing, Start, SurfaceSpec};
+use job::{AxisLimits, Job, NurbsSpec, Pattern, Side, Spacing, Start, SurfaceSpec};
 
 use super::shapes::Random;
 
@@ -188,4 +188,23 @@ fn shorter_than_straight_passes() {
     let mean = sum / SEEDS.len() as f64;
     println!("mean of the bicubic surfaces {mean:.3}");
     assert!(failed.is_empty() && mean <= MEAN_MOST, "{failed}mean {mean:.4}");
+}
+
+/// Whole jobs at 3600 mm/min within the usual axis limits: the better start takes no more than this share of the time of straight passes.
+#[test]
+fn no_slower_than_straight_passes() {
+    for (name, most) in [("sphere_cap", 0.85), ("torus", 1.0), ("plate", 0.99)] {
+        let time = |spacing: Spacing| {
+            let mut job = sample(name);
+            (job.machine.limits, job.feed_mm_min) = (Some(AxisLimits::DEFAULT), 3600.0);
+            (job.pattern, job.spacing) = (Pattern::Zigzag, spacing);
+            let prepared = machine::prepare::prepare(&job).unwrap();
+            inspect::path_figures(&job, &prepared).unwrap().time_s
+        };
+        let straight = time(Spacing::Exact);
+        let [edge, middle] =
+            [Start::Edge, Start::Middle].map(|start| time(Spacing::Constant(start)) / straight);
+        println!("{name}: {straight:.1} s, from the edge {edge:.3}, from the middle {middle:.3}");
+        assert!(edge.min(middle) <= most, "{name}: {edge}, {middle}");
+    }
 }

@@ -95,7 +95,7 @@ pub fn side_curves(job: &Job) -> Result<Vec<SideCurve>, ApproachError> {
         return Ok(Vec::new());
     }
     let mut job = job.clone();
-    // The passes do not depend on the feed.
+    // At a lower feed a front may turn more sharply; without axis limits its stations are the same.
     let densest_mm_min = 60.0 * SPACING_MM / job.machine.period_s();
     job.feed_mm_min = job.feed_mm_min.min(densest_mm_min);
     job.machine.limits = None;

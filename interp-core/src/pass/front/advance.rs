@@ -112,6 +112,8 @@ pub(crate) struct Advance {
     /// Most by which a station is to be lowered.
     excess: i32,
     stations: Stations,
+    /// The intervals between the stations are longer than a step-over may be.
+    is_coarse: bool,
     pub(crate) direction: Direction,
     cursor: SideCursor,
     patch: FreePatch,
@@ -172,6 +174,7 @@ impl Advance {
         is_lowered: false,
         excess: 0,
         stations: Stations { spans: 1, bits: 6 },
+        is_coarse: false,
         direction: Direction::FROM_EDGE,
         cursor: SideCursor::NONE,
         patch: FreePatch::NONE,

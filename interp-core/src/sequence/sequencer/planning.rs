@@ -493,8 +493,8 @@ fn is_too_slow(pass: &PassPlan) -> bool {
     lasts_s * (1.0 / pass.plan.pace_max - 1.0) > REST_SHARE * rest_s
 }
 
-/// Periods that making the front after the next takes, by those of the next front and of the one before, with a quarter more.
+/// Periods that making the front after the next takes, by those of the next front and of the one before, with an eighth more: where that is not enough, the tool lifts.
 const fn front_periods(so_far: u32, last: u32) -> u32 {
     let most = if so_far > last { so_far } else { last };
-    most.saturating_add(most / 4)
+    most.saturating_add(most / 8)
 }

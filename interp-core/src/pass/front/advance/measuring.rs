@@ -13,11 +13,13 @@ use crate::pass::front::table::{Column, Table};
 /// Share of the limit to which the crests of a straight front are measured; by how much more than the excess a front is lowered.
 const LEVEL_MARGIN: f32 = 0.9999;
 const LOWER: f32 = 1.1;
-/// Places in each interval at which crests are measured, and the bend of a front over an interval above which all of them are, as a share of the step there.
+/// Places in each interval at which crests are measured, and the bend of a front over an interval above which all of them are, as a share of the step there: of short intervals, and of long ones.
 const PLACES: u16 = 3;
 const BENT: f32 = 0.1;
-/// Scallop height to which the crests are measured, as a share of the limit.
+const BENT_COARSE: f32 = 0.02;
+/// Scallop height to which the crests are measured, as a share of the limit: between places near each other, and farther apart.
 const MEASURED_MARGIN: f32 = 0.990;
+const MEASURED_MARGIN_COARSE: f32 = 0.983;
 
 impl Advance {
     /// Places at which crests are measured: three in each interval, its middle first, then both ends.
@@ -60,7 +62,8 @@ impl Advance {
         let [front, next] =
             [CURRENT, NEXT].map(|columns| Cubic::of(table, columns, station, length).value(1 << 30));
         let step = to_f32(next.saturating_sub(front)) * UNIT;
-        !(bend.abs() * length * length <= BENT * step)
+        let bent = if self.is_coarse { BENT_COARSE } else { BENT };
+        !(bend.abs() * length * length <= bent * step)
     }
 
     /// Whether the crest is to be measured at a place.
@@ -101,10 +104,10 @@ impl Advance {
     }
 
     pub(super) fn measure_crest<W: DerefMut<Target = [i32]>>(&mut self, job: &Job<'_>, table: &mut Table<W>) {
-        let margin = if self.is_level {
-            LEVEL_MARGIN
-        } else {
-            MEASURED_MARGIN
+        let margin = match (self.is_level, self.is_coarse) {
+            (true, _) => LEVEL_MARGIN,
+            (false, false) => MEASURED_MARGIN,
+            (false, true) => MEASURED_MARGIN_COARSE,
         };
         let mut tools = Tools {
             patch: &mut self.patch,

@@ -17,9 +17,12 @@ use crate::sample::SpanParameter;
 
 /// Points on the first line and on the last one by which the pass's length is measured.
 const LENGTH_POINTS: u16 = 9;
-/// Shortest interval between stations, in periods at the feed and in step-overs.
+/// Shortest interval between stations, in periods at the feed and in step-overs: of a pass that lasts for fewer periods at the feed within axis limits, and of others. A front of 64
+/// intervals is made in some 300 periods, the plan of a pass in as many, and the pass is slowed to both.
 const INTERVAL_PERIODS: f32 = 2.0;
 const INTERVAL_STEPS: f32 = 0.5;
+const INTERVAL_STEPS_SHORT: f32 = 2.0;
+const SHORT_PERIODS: f32 = 1_000.0;
 /// Greatest turn of a pass in one period, rad.
 const TURN_PER_PERIOD: f32 = 0.05;
 /// Least radius of a pass in the tangent plane, in step-overs.
@@ -78,7 +81,13 @@ impl Advance {
             let header = job.header;
             let step = sqrt(8.0 * header.ball_radius_mm * header.scallop_mm);
             let period = header.feed_mm_s * header.period_s;
-            let interval = (INTERVAL_PERIODS * period).at_least(INTERVAL_STEPS * step);
+            self.is_coarse = header.axes.is_some() && longest < SHORT_PERIODS * period;
+            let steps = if self.is_coarse {
+                INTERVAL_STEPS_SHORT
+            } else {
+                INTERVAL_STEPS
+            };
+            let interval = (INTERVAL_PERIODS * period).at_least(steps * step);
             self.stations = Stations::for_intervals(spans, longest / interval);
             self.period_mm = period;
             self.limiter.turn_per_mm = (TURN_PER_PERIOD / period).at_most(1.0 / (RADIUS_STEPS * step));
