@@ -95,6 +95,28 @@ fn every_face_of_a_part_is_verified() {
     }
 }
 
+/// A face that looks down is turned up; the file's +z reaches nothing of it.
+#[test]
+fn the_best_side_is_turned_up() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::copy(cad("blade.step"), folder.path().join("blade.step")).unwrap();
+    let import = |up: &str, name: &str| {
+        let command = format!(
+            "import blade.step --part --tool 3 --scallop-mm 0.2 --faces 2 --up {up} -o {name} --json"
+        );
+        let (summary, code) = json(folder.path(), &command);
+        assert_eq!(code, Some(0), "{summary}");
+        summary
+    };
+    let best = import("auto", "best");
+    assert_eq!(best["up"], "-z", "{best}");
+    assert!(
+        number(&best["region_mm2"]) > 0.9 * number(&best["area_mm2"]),
+        "{best}"
+    );
+    assert_eq!(import("+z", "other")["reachable_mm2"], 0.0);
+}
+
 /// A part of which nothing can be imported has no job, and says why.
 #[test]
 fn a_part_without_a_job_tells_why() {

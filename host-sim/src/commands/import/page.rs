@@ -123,7 +123,12 @@ pub(super) struct PartRow<'f> {
     pub(super) cells: &'f [([u8; 3], [[f64; 3]; 4])],
     /// Red, green, blue.
     pub(super) tint: [u8; 3],
+    /// Its place in the order in which the faces are machined, from 1.
+    pub(super) run: Option<usize>,
 }
+
+/// What a colour stands for, or a sentence without one.
+pub(super) type LegendEntry = (Option<[u8; 3]>, String);
 
 /// An edge with few enough points for a picture.
 fn thinned(edge: &Edge) -> Vec<[f64; 3]> {
@@ -138,7 +143,7 @@ fn thinned(edge: &Edge) -> Vec<[f64; 3]> {
 }
 
 /// The page of a whole part.
-pub(super) fn part_page(file: &str, legend: &str, rows: &[PartRow<'_>]) -> String {
+pub(super) fn part_page(file: &str, legend: &[LegendEntry], rows: &[PartRow<'_>]) -> String {
     let quads = QUADS[usize::from(rows.len() > MANY)];
     let faces = rows.iter().map(|row| {
         let outline = cad::outline(row.face).ok();
@@ -151,11 +156,13 @@ pub(super) fn part_page(file: &str, legend: &str, rows: &[PartRow<'_>]) -> Strin
         };
         let ring = |ring: &Vec<[f64; 3]>| ring.iter().map(|point| rounded(*point)).collect::<Vec<_>>();
         let region: Vec<_> = row.region.iter().map(ring).collect();
+        // What CAD systems write where there is no name.
+        let name = row.face.name.as_ref().filter(|name| !name.trim().is_empty() && *name != "NONE");
         let command = row.job.as_ref().map_or(String::new(), |job| {
             format!("{} verify {}", programs::command_name(), quoted(job))
         });
         json!({
-            "number": row.face.number, "entity": row.face.entity, "kind": row.face.surface.kind(), "name": row.face.name, "rgb": row.tint,
+            "run": row.run, "number": row.face.number, "entity": row.face.entity, "kind": row.face.surface.kind(), "name": name, "rgb": row.tint,
             "area": row.area_mm2, "size": null, "state": row.state, "command": command, "whole_outline": polygons.len() == 1,
             "polygons": polygons, "cells": cells, "edges": edges,
             "regions": if region.is_empty() || in_cells { Vec::new() } else { vec![region] },

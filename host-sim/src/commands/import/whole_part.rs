@@ -222,7 +222,7 @@ fn write(
         whole::write(output.path, text.as_bytes(), arguments.force)?;
     }
     let sums = Sums::of(&outcomes);
-    let page = page(file, model, setup, &outcomes);
+    let page = page(file, model, setup, &order, &outcomes);
     let page_path = output.page();
     whole::write(&page_path, page.as_bytes(), arguments.force)?;
     let summary = summary(

@@ -56,7 +56,13 @@ fn tint(state: State) -> [u8; 3] {
 }
 
 /// The page: what is finished, what is not.
-pub(super) fn page(file: &str, model: &Arc<Model>, setup: &Setup, outcomes: &[Outcome]) -> String {
+pub(super) fn page(
+    file: &str,
+    model: &Arc<Model>,
+    setup: &Setup,
+    order: &[usize],
+    outcomes: &[Outcome],
+) -> String {
     let placed: Vec<(usize, Face)> = outcomes
         .iter()
         .enumerate()
@@ -107,16 +113,39 @@ pub(super) fn page(file: &str, model: &Arc<Model>, setup: &Setup, outcomes: &[Ou
                 region,
                 cells: &outcome.cells,
                 tint,
+                run: order.iter().position(|of| of == index).map(|place| place + 1),
             }
         })
         .collect();
     let sums = Sums::of(outcomes);
-    let legend = format!(
-        "Green: finished, {:.2} % of what the tool reaches. Red: the tool does not reach it. Grey: too steep, or looks down. Orange: reached, but left. \
-         Violet: not imported. Passes: about {:.1} min.",
-        Sums::share(sums.region, sums.reachable),
-        outcomes.iter().map(|outcome| outcome.passes_s).sum::<f64>() / 60.0
-    );
+    let entry = |state: State, words: String| (Some(tint(state)), words);
+    let passes_min = outcomes.iter().map(|outcome| outcome.passes_s).sum::<f64>() / 60.0;
+    let share = Sums::share(sums.region, sums.reachable);
+    let legend = [
+        entry(
+            State::Finished,
+            format!("finished: {share:.2} % of what the tool reaches"),
+        ),
+        entry(State::Left, "reached, but left".to_owned()),
+        entry(
+            State::Unreachable(Reason::Ball),
+            "the tool does not reach it".to_owned(),
+        ),
+        entry(
+            State::Unreachable(Reason::Steep),
+            "too steep, or looks down".to_owned(),
+        ),
+        (Some(NOT_IMPORTED), "not imported".to_owned()),
+        (
+            None,
+            format!(
+                "{} of {} faces are machined, passes about {passes_min:.1} min, {} up",
+                order.len(),
+                outcomes.len(),
+                setup.up.name()
+            ),
+        ),
+    ];
     part_page(file, &legend, &rows)
 }
 

@@ -7,6 +7,7 @@ use clap::ValueEnum;
 use glam::DVec3;
 use part::{Part, Tool, placed_part};
 use patches::placement::Rotation;
+use rayon::prelude::*;
 
 use super::face::Asked;
 
@@ -134,7 +135,7 @@ pub(super) fn best_side(
             setup: &setup,
         };
         let known = faces
-            .iter()
+            .par_iter()
             .zip(made)
             .filter_map(|(face, made)| Some((face, made.as_ref().ok()?)));
         let reached: f64 = known
