@@ -389,6 +389,21 @@ fn passes_around_a_point() {
                 100.0 * excess,
                 100.0 * error
             );
+            if name.starts_with("dome") {
+                // Links from the point itself: docs/limits.md.
+                job.pattern = job::Pattern::Zigzag;
+                job.machine.limits = Some(job::AxisLimits::DEFAULT);
+                job.feed_mm_min = 1200.0;
+                let prepared = prepare(&job).unwrap();
+                let timed = inspect::time_run(&job, &prepared, &()).unwrap();
+                let requirements = inspect::Requirements::default();
+                let found = inspect::verify_run(&job, &prepared, &timed, None, &requirements, &()).unwrap();
+                assert!(
+                    found.failures.is_empty(),
+                    "{name} {start:?}: {:?}",
+                    found.failures
+                );
+            }
         }
     }
 }

@@ -38,7 +38,7 @@ const ADVANCE_MIN: f32 = 1e-6;
 enum Task {
     /// Measure the length of the passes.
     Length,
-    /// Find whether the boundary ahead is a single point.
+    /// Find whether the boundary ahead is a single point, and whether the first line is one.
     Ahead,
     /// Set the front to the first line.
     Clear,
@@ -76,7 +76,7 @@ enum Task {
 pub(crate) enum Made {
     /// A front with a part before the boundary.
     Front,
-    /// A straight one, too short for its stations: the line at this distance from the first one.
+    /// A straight one, too short for its stations or beside a point: the line at this distance from the first one.
     Line(i32),
     /// Every station is at the boundary or beyond it.
     Beyond,
@@ -95,7 +95,7 @@ pub(crate) struct Advance {
     /// The next one is made straight; the least and the greatest step, units of the fronts.
     is_level: bool,
     steps: [i32; 2],
-    /// The next one is made straight because an interval between its stations would be shorter than a period's arc, mm. Its length, and where it is.
+    /// The next one is made straight: an interval between its stations would be shorter than a period's arc, mm, or it would pass by a point ahead. Its length, and where it is.
     is_short: bool,
     period_mm: f32,
     front_mm: f32,
@@ -131,25 +131,18 @@ pub(crate) struct Advance {
     has_gaps: bool,
     /// The passes' ends are poles.
     poles: [bool; 2],
-    /// The boundary ahead is a single point, which every station comes to, or none.
+    /// The boundary ahead is a single point, and the first line.
     is_point_ahead: bool,
-    approach: Approach,
-    /// The current front is half a step before that point, or nearer.
+    is_point_behind: bool,
+    /// Every station steps as far as the point, or is covered; some come within a step of it; the next pass is the point.
+    reaches_point: bool,
+    is_near_point: bool,
+    is_on_point: bool,
+    /// The current front is half a step before the point, or nearer.
     is_covered: bool,
     /// The surface is faulty at a step.
     fault: Option<Fault>,
     made: Option<Made>,
-}
-
-/// How the next front comes to a boundary that is a single point.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Approach {
-    /// Every station so far steps as far as the point.
-    Reaches,
-    /// It ends half a step before the point, where it is not farther away.
-    StopsBefore,
-    /// The next pass is the point.
-    OnPoint,
 }
 
 impl Advance {
@@ -190,7 +183,10 @@ impl Advance {
         has_gaps: false,
         poles: [false; 2],
         is_point_ahead: false,
-        approach: Approach::Reaches,
+        is_point_behind: false,
+        reaches_point: true,
+        is_near_point: false,
+        is_on_point: false,
         is_covered: false,
         fault: None,
         made: None,
@@ -239,7 +235,8 @@ impl Advance {
         (self.front_mm, self.line, self.is_whole) = (0.0, i32::MAX, true);
         self.is_shifted = false;
         self.fault = None;
-        (self.approach, self.is_covered) = (Approach::Reaches, true);
+        (self.reaches_point, self.is_covered) = (true, true);
+        (self.is_near_point, self.is_on_point) = (false, false);
         self.has_gaps = false;
         self.foot.begin((0, 0));
     }
@@ -303,7 +300,7 @@ impl Advance {
         let record = self.patch.record();
         match self.task {
             Task::Length => self.measure_length(job),
-            Task::Ahead => self.look_ahead(job),
+            Task::Ahead => self.look_at_boundary(job),
             Task::Step => {
                 self.pass_over(table);
                 if self.task == Task::Step {
@@ -354,8 +351,8 @@ impl Advance {
                 self.start_front();
                 return;
             }
-            Task::Step if self.is_point_ahead && (self.is_covered || self.approach == Approach::Reaches) => {
-                self.approach = Approach::OnPoint;
+            Task::Step if self.is_point_ahead && (self.is_covered || self.reaches_point) => {
+                self.is_on_point = true;
                 (Task::Point, 0)
             }
             Task::Step => {
@@ -365,6 +362,7 @@ impl Advance {
                     && self.front_mm < self.period_mm * to_f32(i32::from(to.saturating_sub(from)));
                 let is_even = most > 0.0 && most <= LEVEL * least;
                 self.is_level = self.is_straight && is_even && !self.is_short;
+                self.is_short |= self.is_near_point && !self.is_level;
                 (self.after_steps(self.has_gaps), 0)
             }
             Task::FillForwards => (Task::FillBackwards, 0),
@@ -384,20 +382,12 @@ impl Advance {
             Task::Eliminate => (Task::Substitute, 0),
             Task::Substitute => {
                 self.is_lowered = false;
-                if self.is_sharp && self.is_point_ahead && !self.is_short {
-                    // Stations wait before the point: moved as a whole, the front would not advance.
-                    self.is_short = true;
-                    (Task::Level, 0)
-                } else if self.is_sharp && !self.is_shifted {
+                if self.is_sharp && !self.is_shifted && !self.is_short {
                     self.is_shifted = true;
                     (Task::Shift, 0)
                 } else if self.is_point_ahead && self.is_covered {
                     (Task::Done, count)
-                } else if self.is_level
-                    || self.is_short
-                    || self.is_shifted
-                    || self.approach == Approach::OnPoint
-                {
+                } else if self.is_level || self.is_short || self.is_shifted || self.is_on_point {
                     self.excess = 0;
                     self.search.begin(self.crest_place(0));
                     (Task::Crest, 0)
@@ -415,9 +405,9 @@ impl Advance {
                 self.search.begin(self.crest_place(0));
                 (Task::Crest, 0)
             }
-            Task::Crest if self.is_lowered && self.approach == Approach::OnPoint => {
+            Task::Crest if self.is_lowered && self.is_on_point => {
                 self.start_front();
-                self.approach = Approach::StopsBefore;
+                self.reaches_point = false;
                 return;
             }
             Task::Crest if self.is_lowered && self.is_short && self.measured < MEASUREMENTS => {

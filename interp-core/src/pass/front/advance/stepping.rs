@@ -2,7 +2,7 @@
 
 use core::ops::DerefMut;
 
-use super::{Advance, Approach, CHUNK, SLOPE_MAX, Task};
+use super::{Advance, CHUNK, SLOPE_MAX, Task};
 use crate::job::program::Job;
 use crate::job::stations::Stations;
 use crate::math::arith::sqrt;
@@ -96,16 +96,24 @@ impl Advance {
         }
     }
 
-    /// Looks whether the boundary ahead is a single point.
-    pub(super) fn look_ahead(&mut self, job: &Job<'_>) {
+    /// Looks whether the boundary ahead is a single point, then the first line.
+    pub(super) fn look_at_boundary(&mut self, job: &Job<'_>) {
         let middle = SpanParameter {
             span: 0,
             fraction: 1 << 63,
         };
-        let (direction, end) = (&self.direction, self.direction.end);
-        let frame = Frame::at(&mut self.patch, job, &mut self.cursor, direction, middle, end);
-        self.is_point_ahead = frame.is_ok_and(|frame| frame.e <= POLE_MAX * frame.g);
-        (self.task, self.station) = (Task::Clear, 0);
+        let is_first_line = self.station > 0;
+        let at = if is_first_line { 0 } else { self.direction.end };
+        let direction = &self.direction;
+        let frame = Frame::at(&mut self.patch, job, &mut self.cursor, direction, middle, at);
+        let is_point = frame.is_ok_and(|frame| frame.e <= POLE_MAX * frame.g);
+        if is_first_line {
+            self.is_point_behind = is_point;
+            (self.task, self.station) = (Task::Clear, 0);
+        } else {
+            self.is_point_ahead = is_point;
+            self.station = 1;
+        }
     }
 
     /// Passes over places so far beyond the boundary that no pass comes near them: the front there is as far as the limits allow.
@@ -185,12 +193,8 @@ impl Advance {
         if is_within {
             self.line = self.line.min(front);
             self.is_whole &= own < self.direction.end;
+            self.note_point(own, front);
         }
-        let front = if self.is_point_ahead {
-            self.before_point(own, front)
-        } else {
-            front
-        };
         if own < self.direction.end && is_within {
             let step = front.saturating_sub(own);
             let [least, most] = self.steps;
@@ -212,17 +216,19 @@ impl Advance {
         }
     }
 
-    /// The next front beside a boundary that is a single point. The point is a pass for all stations, or for none: a front through it would leave and enter it
-    /// in a corner. Where it is within a step from some stations only, the front waits for the others half a step before it, from where all around the point is
-    /// cut already.
-    fn before_point(&mut self, own: i32, front: i32) -> i32 {
-        let end = self.direction.end;
-        let half = end.saturating_sub(self.foot.half_step());
-        self.is_covered &= own >= half;
-        if front < end && own < half && self.approach == Approach::Reaches {
-            self.approach = Approach::StopsBefore;
+    /// Notes how near the next front is to a boundary that is a single point, where it would bend sharply. The point ahead is a pass for all stations, or for none: a front
+    /// through it would leave and enter it in a corner.
+    fn note_point(&mut self, own: i32, front: i32) {
+        let half = self.foot.half_step();
+        let step = half.saturating_mul(2);
+        if self.is_point_ahead {
+            let end = self.direction.end;
+            let is_covered = own >= end.saturating_sub(half);
+            self.is_covered &= is_covered;
+            self.reaches_point &= front >= end || is_covered;
+            self.is_near_point |= front >= end.saturating_sub(step);
         }
-        front.min(half).max(own)
+        self.is_near_point |= self.is_point_behind && own <= step;
     }
 
     /// Stations and the middles between them, in turns.
