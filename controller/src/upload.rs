@@ -68,7 +68,7 @@ impl Rows {
         within.is_some() && left == 1
     }
 
-    /// Checks a row that is complete, a record at a time, so that a run is not delayed by more than a copy. Not inlined: the copies would take stack from every other request.
+    /// Checks a row that is complete, a record at a time, so that a run is not delayed by more than a copy.
     #[inline(never)]
     fn check(&mut self, machine: &mut impl Machine) -> Result<(), Reason> {
         if self.digest.value() != self.told {
@@ -89,15 +89,20 @@ impl Rows {
             self.checked += 1;
         }
         for _ in 0..self.patches {
-            let record = self.checked;
-            let checked = machine.load_copy(record).and_then(|copy| copy.check());
-            machine
-                .load_judged(record, checked)
-                .map_err(|fault| refused(fault, Some(record)))?;
+            check_patch(machine, self.checked)?;
             self.checked += 1;
         }
         Ok(())
     }
+}
+
+/// Checks a patch of a streamed job. Not inlined: its copy would take stack beside the checks of edges.
+#[inline(never)]
+fn check_patch(machine: &mut impl Machine, record: u32) -> Result<(), Reason> {
+    let checked = machine.load_copy(record).and_then(|copy| copy.check());
+    machine
+        .load_judged(record, checked)
+        .map_err(|fault| refused(fault, Some(record)))
 }
 
 /// The core's fault as the reason of a `Nak`.

@@ -445,6 +445,11 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         2,
         "ends of a plan that are compared",
     ),
+    (
+        "interp_core::sequence::sequencer::planning::next_own_cycles",
+        2,
+        "ends of a plan that are compared",
+    ),
     ("interp_core::feed::newton::rows::Place::rows", 3, "axes"),
     ("interp_core::feed::plan::motion::MotionAt::each_axis", 3, "axes"),
     (
