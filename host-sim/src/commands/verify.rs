@@ -257,6 +257,19 @@ fn original(job: &Job) -> Result<Option<(Box<swept::OriginalOffset<'static>>, f6
     }))
 }
 
+/// Folder of a job's report among those of several: `part-34` for face 34 of `part.toml`.
+fn folder_of(job: &Path) -> String {
+    let name = job.file_name().unwrap_or(job.as_os_str()).to_string_lossy();
+    match name.split_once(".toml#") {
+        Some((stem, face)) => format!("{stem}-{face}"),
+        None => job
+            .file_stem()
+            .unwrap_or(job.as_os_str())
+            .to_string_lossy()
+            .into_owned(),
+    }
+}
+
 /// Verifies the jobs, prints the figures, and fails if any job does; with the exit code of bad input if a job cannot be read.
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let mut jobs = Vec::new();
@@ -281,7 +294,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         let directory = arguments
             .report
             .as_ref()
-            .map(|directory| directory.join(job.file_stem().unwrap_or(job.as_os_str())));
+            .map(|directory| directory.join(folder_of(job)));
         match verify_job(arguments, job, *stop, directory.as_deref()) {
             Ok((passed, value)) => {
                 all_passed &= passed;
