@@ -439,6 +439,12 @@ mod tests {
     use super::*;
 
     #[test]
+    fn each_face_of_a_part_has_a_folder() {
+        assert_eq!(folder_of(Path::new("a/part.toml#34")), "part-34");
+        assert_eq!(folder_of(Path::new("a/plate.v2.toml")), "plate.v2");
+    }
+
+    #[test]
     fn shares_are_percents_or_numbers() {
         for (text, exact) in [
             ("1%", 0.01),
