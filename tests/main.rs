@@ -28,6 +28,7 @@ mod overrun;
 mod paper;
 mod pass_times;
 mod pause;
+mod points;
 mod protocol;
 mod qemu;
 mod random_passes;

@@ -10,7 +10,8 @@ pub enum FaultKind {
     /// Value: the surface's principal curvature towards the tool times the ball radius (at least 0.99999 where the ball does not fit).
     BallDoesNotFit = 1,
     /// `S_u x S_v` is too small to compute a normal, or changed its sign between two samples, so that the tool would change
-    /// sides. Value: `|S_u x S_v| / (|S_u| |S_v|)`, the sine between them; 0 where it went through zero.
+    /// sides; or, with axis limits, the tangent plane jumps at a knot so far that an axis would be faster than its limit.
+    /// Value: `|S_u x S_v| / (|S_u| |S_v|)`, the sine between them; 0 where it went through zero, and where the tangent plane jumps.
     DegenerateSurface = 2,
     /// The path parameter's increment for one period is not positive.
     /// Value: ratio of the increment's second- and third-order terms to its first-order term (-1 or less: backwards).

@@ -102,7 +102,28 @@ impl PassPath<'_> {
         let first = at(0);
         (1..=PLACES).all(|k| at(k).distance(first) < 1e-9)
     }
+
+    /// Whether the pass, whose centre begins here, is a point with more than one normal.
+    ///
+    /// # Errors
+    /// As [`Oracle::offset`].
+    pub fn is_tip(&self, begin_mm: DVec3) -> Result<bool, OracleError> {
+        if !self.is_point() {
+            return Ok(false);
+        }
+        let [start, end] = self.ends;
+        for share in [0.25, 0.5, 0.75, 1.0] {
+            let at = self.at(start + (end - start) * share)?;
+            if at.contact.cl_mm.distance(begin_mm) > TIP_MM {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
 }
+
+/// Distance of two centres above one contact from which on their normals differ, mm.
+const TIP_MM: f64 = 2e-5;
 
 /// Distance of a point from a segment, mm.
 pub(crate) fn from_segment(point: DVec3, from: DVec3, to: DVec3) -> f64 {

@@ -30,10 +30,10 @@ fn words(kind: FaultKind) -> [&'static str; 5] {
             "jobs/torus.toml is a groove of 8 mm radius. With `radius_mm = 9` in [tool] the fault comes at its first sample, with the value 1.125 = 9/8.",
         ],
         FaultKind::DegenerateSurface => [
-            "The surface has no normal here, or folds over, so that the tool would change to the other side.",
-            "The sine of the angle between the surface's two parameter directions, |S_u x S_v| / (|S_u| |S_v|); 0 where it folds between two samples.",
-            "The two parameter lines are tangent to each other, or one derivative vanishes where the boundary is not exactly one point; or the normal turned by more than 120 degrees from one sample to the next.",
-            "End the surface before this point, or reparametrise the surface. A boundary that is exactly one point, like the pole of a sphere, is allowed.",
+            "The surface has no normal here, or folds over, so that the tool would change to the other side; or its tangent plane jumps, so that the tool centre would.",
+            "The sine of the angle between the surface's two parameter directions, |S_u x S_v| / (|S_u| |S_v|); 0 where it folds between two samples, and where the tangent plane jumps.",
+            "The two parameter lines are tangent to each other, or one derivative vanishes where the boundary is not exactly one point; or the normal turned by more than 120 degrees from one sample to the next; or, with axis limits, a pass crosses a knot where the surface has an edge (a crease).",
+            "End the surface before this point, or reparametrise the surface. A boundary that is exactly one point, like the pole of a sphere, is allowed. Where the tangent plane jumps, cut the surface into two faces at the knot.",
             "A bicubic patch with a corner pole on the line through the two adjacent poles: S_u and S_v are parallel there.",
         ],
         FaultKind::ParameterBackwards => [

@@ -96,6 +96,11 @@ pub fn fault(fault: Fault) -> (String, &'static str) {
             ),
             "take a smaller ball, or machine this region with another tool",
         ),
+        FaultKind::DegenerateSurface if value == 0.0 => (
+            "the surface folds over between two samples, or its tangent plane jumps at a knot (a crease)"
+                .to_owned(),
+            "end the surface before this place; at a crease cut it into two faces at the knot",
+        ),
         FaultKind::DegenerateSurface => (
             format!(
                 "the surface has no normal, or folds over: the sine between S_u and S_v is {value:.2e}, below {:.0e}",

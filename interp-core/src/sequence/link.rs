@@ -17,10 +17,12 @@ use crate::pass::patch::Patch;
 use crate::pass::position::PassPosition;
 use crate::pass::schedule;
 use crate::sample::SpanParameter;
-use crate::sequence::lookahead::check_travel;
+use crate::sequence::lookahead::{check_crease, check_travel};
 
 /// Links up to this length, nm, are omitted: the rounding difference of one position computed twice.
 const NOTHING_NM: i64 = 2;
+/// Places of the centre above one contact that are farther apart, nm, differ by more than the rounding of their normals.
+const ELSEWHERE_NM: i64 = 20;
 
 /// Shares of the acceleration that a bend of a step-over may take.
 const BEND_SHARE: f32 = 0.5;
@@ -299,7 +301,8 @@ pub(crate) struct BoundaryStepOver {
     jump_at: f32,
     jump: f32,
     jump_beside: f32,
-    contact: [i32; 3],
+    /// The place before: the contact at the last station, the centre at a side of a knot.
+    place: [i32; 3],
     /// Maximum ratio of the length of the contact's path to the length in the plan.
     contact_ratio: f32,
     /// Feed for which it was planned, mm/s.
@@ -334,7 +337,7 @@ impl BoundaryStepOver {
         jump_at: 0.0,
         jump: 0.0,
         jump_beside: 0.0,
-        contact: [0; 3],
+        place: [0; 3],
         contact_ratio: 1.0,
         feed: 1.0,
     };
@@ -471,7 +474,7 @@ impl BoundaryStepOver {
                 }
             }
             Task::Knot(index) => {
-                self.look_at_knot(job, index)?;
+                self.look_at_knot(job, axes, index)?;
                 self.next_knot(index + 1)
             }
             Task::Station(index) => {
@@ -481,10 +484,10 @@ impl BoundaryStepOver {
                 self.window.push(here.cl_nm, part * self.length);
                 if index > 0 {
                     let cell = self.length * (1.0 / f32::from(STATIONS - 1));
-                    let ratio = distance(&self.contact, &here.cc_nm) / cell;
+                    let ratio = distance(&self.place, &here.cc_nm) / cell;
                     self.contact_ratio = self.contact_ratio.at_least(ratio);
                 }
-                self.contact = here.cc_nm;
+                self.place = here.cc_nm;
                 if index + 1 < STATIONS {
                     Task::Station(index + 1)
                 } else {
@@ -521,7 +524,7 @@ impl BoundaryStepOver {
     }
 
     /// Where the curvature across a knot jumps, so does the direction of the centre's motion.
-    fn look_at_knot(&mut self, job: &Job<'_>, index: u16) -> Result<()> {
+    fn look_at_knot(&mut self, job: &Job<'_>, axes: &AxisLimits, index: u16) -> Result<()> {
         let span = self.from.span.min(self.to.span) + index;
         let before = SpanParameter {
             span,
@@ -534,7 +537,11 @@ impl BoundaryStepOver {
         let mut sides = [0.0; 2];
         for (of_side, parameter) in sides.iter_mut().zip([before, behind]) {
             let at = self.move_to(job, parameter)?;
-            let (contact, _) = self.patch.evaluate(at)?;
+            let (contact, located) = self.patch.evaluate(at)?;
+            if parameter.span > span {
+                check_crease(job, axes, [&self.place, &located.cl_nm])?;
+            }
+            self.place = located.cl_nm;
             *of_side = match self.along {
                 Along::Side => contact.across / contact.lateral_squared,
                 Along::Path => contact.along,
@@ -658,6 +665,12 @@ pub(crate) fn check_faces_up(up: bool) -> Result<()> {
     } else {
         Err(Fault::new(FaultKind::LinkBlocked, 0.0))
     }
+}
+
+/// Whether two places of the centre above one contact differ by more than rounding.
+pub(crate) fn is_elsewhere(from: &[i32; 3], to: &[i32; 3]) -> bool {
+    let mut pairs = from.iter().zip(to);
+    pairs.any(|(from, to)| (i64::from(*to) - i64::from(*from)).abs() > ELSEWHERE_NM)
 }
 
 fn distance(from: &[i32; 3], to: &[i32; 3]) -> f32 {

@@ -88,6 +88,8 @@ struct Path {
     end_mm: DVec3,
     /// Path and side parameter of start and end.
     ends: [[f64; 2]; 2],
+    /// The pass is a point with more than one normal: the tool stands at its start alone.
+    is_tip: bool,
     cuts: Vec<Cut>,
 }
 
@@ -110,12 +112,15 @@ impl Path {
         }
         let at = |end: usize| pass.at(pass.ends[end]).map(|at| at.contact.cl_mm);
         let (begin_mm, end_mm) = (at(0)?, at(1)?);
+        let is_tip = pass.is_tip(begin_mm)?;
+        let end_mm = if is_tip { begin_mm } else { end_mm };
         Ok(Self {
             begin_mm,
             // A degenerate pass has no points.
             highest_mm: highest_mm.max(begin_mm[2]).max(end_mm[2]),
             end_mm,
             ends: pass.ends.map(|path| [path, pass.side_at(path)]),
+            is_tip,
             cuts,
         })
     }
@@ -143,7 +148,8 @@ pub fn export(job: &Job, options: &Options, done: &dyn Fn()) -> Result<ExportedP
         let is_beside = |before: &&Path| {
             let ends = [before.ends[1], path.ends[0]];
             let centres = [before.end_mm, path.begin_mm];
-            job.pattern == Pattern::Zigzag && links::is_beside(ends, centres, job.spacing.is_constant())
+            let may_step = job.pattern == Pattern::Zigzag && !before.is_tip;
+            may_step && links::is_beside(ends, centres, job.spacing.is_constant())
         };
         match before.filter(is_beside) {
             Some(before) => {

@@ -15,7 +15,7 @@ use crate::feed::turn::{self, Turn, TurnEnd};
 use crate::feed::{MM_PER_Q10, to_q10};
 use crate::job::program::Job;
 use crate::job::{AxisLimits, Pattern, Spacing};
-use crate::math::number::{nm_to_mm, to_f32};
+use crate::math::number::{MM_PER_NM, nm_to_mm, to_f32};
 use crate::pass::lines::{self, NextPass, RegionLines};
 use crate::pass::patch::Patch;
 use crate::pass::route::{Piece, Route};
@@ -254,7 +254,7 @@ impl Lookahead {
         out.pass = pass;
         out.route = route;
         out.cells = 0;
-        out.point = false;
+        (out.point, out.is_tip) = (false, false);
         out.full_pace = 1.0;
         out.next = None;
         out.steps_over = false;
@@ -358,8 +358,9 @@ impl Lookahead {
                     out.next = lines.take(job.header);
                     let rows = estimator.as_deref().map(StepOverEstimator::rows);
                     let is_joined = |route: &Route| lines.joins(job.header, &out.route, route, rows);
-                    out.steps_over =
-                        job.header.pattern == Pattern::Zigzag && out.next.as_ref().is_some_and(is_joined);
+                    out.steps_over = job.header.pattern == Pattern::Zigzag
+                        && !out.is_tip
+                        && out.next.as_ref().is_some_and(is_joined);
                     self.choose_link(job, axes, rows, out)
                 }
                 NextPass::None => self.choose_link(job, axes, None, out),
@@ -487,7 +488,7 @@ impl Lookahead {
                 None => out.route.side,
             };
             out.next = Some(Route::of_pass(header, out.pass.wrapping_add(1), side));
-            out.steps_over = header.pattern == Pattern::Zigzag;
+            out.steps_over = header.pattern == Pattern::Zigzag && !out.is_tip;
         }
         Ok(true)
     }
@@ -512,6 +513,21 @@ fn stations_of(job: &Job<'_>) -> u16 {
 pub(crate) fn has_turns(job: &Job<'_>) -> bool {
     let overruns = job.header.axes.is_some_and(|axes| axes.overrun_mm > 0.0);
     overruns && job.header.pattern == Pattern::Zigzag && job.header.path_spans <= SPANS_TURNED
+}
+
+/// Where the tangent plane jumps at a knot, so does the ball's centre: `sides` are its places on both.
+///
+/// # Errors
+/// [`FaultKind::DegenerateSurface`] with the value 0 where an axis would be faster than its limit in the period that crosses the knot.
+pub(crate) fn check_crease(job: &Job<'_>, axes: &AxisLimits, sides: [&[i32; 3]; 2]) -> Result<()> {
+    let [before, behind] = sides;
+    for ((before, behind), velocity) in before.iter().zip(behind).zip(&axes.velocity_mm_s) {
+        let apart_mm = to_f32(i64::from(*behind) - i64::from(*before)) * MM_PER_NM;
+        if apart_mm.abs() > velocity * job.header.period_s {
+            return Err(Fault::new(FaultKind::DegenerateSurface, 0.0));
+        }
+    }
+    Ok(())
 }
 
 /// # Errors

@@ -28,8 +28,9 @@ pub(crate) struct PassPlan {
     pub(super) cell_fraction: u64,
     /// Patches of a group: where a pass has more than [`PATCHES`], the ends of groups are kept, with the greatest derivatives within them.
     pub(super) group: u16,
-    /// The pass is a single point.
+    /// The pass is a single point; and the normals at it differ, so that the tool stands at its first place alone.
     pub(crate) point: bool,
+    pub(crate) is_tip: bool,
     /// The pace at the programmed feed.
     pub(super) full_pace: f32,
     /// Cutter location at start and end, nm, and whether the surface faces up there.
@@ -65,6 +66,7 @@ impl PassPlan {
         cell_fraction: 0,
         group: 1,
         point: false,
+        is_tip: false,
         full_pace: 1.0,
         ends: [[0; 3]; 2],
         faces_up: [false; 2],

@@ -1,6 +1,6 @@
 //! Stations of a piece: which of them are looked at and kept, their checks, arcs and derivatives.
 
-use super::{CELL_KEPT_MM, Lookahead, PATCHES, PassPlan, Task, check_travel, stations_of};
+use super::{CELL_KEPT_MM, Lookahead, PATCHES, PassPlan, Task, check_crease, check_travel, stations_of};
 use crate::fault::{Fault, FaultKind, Result};
 use crate::feed::stations::{Derivatives, Station, WINDOW};
 use crate::job::program::Job;
@@ -8,6 +8,7 @@ use crate::job::{AxisLimits, Spacing, SurfaceKind};
 use crate::math::arith::{fraction_to_f32, sqrt, truncated};
 use crate::math::number::{Bounded, MM_PER_NM, nm_to_mm, to_f32};
 use crate::pass::step_over::{PassMaximum, StepOverEstimator};
+use crate::sequence::link::is_elsewhere;
 use crate::surface::{Contact, PathSpeed};
 
 /// Least length of a cell, mm: a shorter one has differences of rounded positions.
@@ -225,13 +226,19 @@ impl Lookahead {
         }
         let side = self.patch.side_at(&self.piece.position, fraction);
         let is_up = self.patch.faces_up(contact.offset);
-        if (self.patches == 0 && self.station == 0) || out.point {
+        if self.patches == 0 && self.station == 0 {
             (out.ends, out.faces_up, out.sides) = ([located.cl_nm; 2], [is_up; 2], [side; 2]);
         }
-        (out.ends[1], out.faces_up[1], out.sides[1]) = (located.cl_nm, is_up, side);
         if out.point {
+            out.is_tip |= is_elsewhere(&out.ends[0], &located.cl_nm);
+            out.ends[1] = if out.is_tip { out.ends[0] } else { located.cl_nm };
             return Ok(());
         }
+        let is_first_look = self.halvings == 0;
+        if self.patches > 0 && self.station == 0 && is_first_look {
+            check_crease(job, axes, [&out.ends[1], &located.cl_nm])?;
+        }
+        (out.ends[1], out.faces_up[1], out.sides[1]) = (located.cl_nm, is_up, side);
         let path = self.speed_of(&contact);
         if self.station > 0 {
             self.arc_mm += self.cell_length(job, &path);

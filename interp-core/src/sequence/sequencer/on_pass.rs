@@ -76,7 +76,10 @@ impl Sequencer {
     ) -> Result<()> {
         self.correct_progress(run);
         let (now, _) = both(&mut self.plans, self.second);
-        let is_over = if now.point {
+        let is_over = if now.is_tip {
+            run.stand(last);
+            command.feed_factor > 0.0
+        } else if now.point {
             if command.feed_factor > 0.0 && run.is_along() {
                 run.advance_far(job, 1.0, last)?;
             } else {

@@ -469,7 +469,8 @@ impl Sequencer {
         self.has_to_choose = false;
         let (now, next) = both(&mut self.plans, self.second);
         let may_step = job.header.edges == 0 || next.route.joins;
-        now.steps_over = job.header.pattern == Pattern::Zigzag && may_step && now.is_beside(next, job);
+        let may_step = may_step && !now.is_tip && job.header.pattern == Pattern::Zigzag;
+        now.steps_over = may_step && now.is_beside(next, job);
         if now.steps_over {
             self.step_over.request();
             self.has_step_over = true;
