@@ -208,9 +208,8 @@ fn fits_keep_the_tolerance() {
         let mut patches = 0;
         for tolerance_mm in [0.3, 0.1, 0.02] {
             let options = Options {
-                around_mm: 0.0,
                 tolerance_mm,
-                untrimmed: true,
+                ..whole()
             };
             let made = machinable("", face, &options).unwrap();
             let Form::Fitted { deviation, .. } = &made.form else {

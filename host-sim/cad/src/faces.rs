@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use glam::DVec3;
-use job::CadSource;
+use job::{CadSource, FaceParameters};
 use job_file::{Face, FaceError};
 
 use crate::{CadError, Form, MachinableFace, Model, Options, machinable, read_once};
@@ -56,6 +56,7 @@ impl Original {
         let options = Options {
             tolerance_mm: source.tolerance_mm,
             untrimmed: source.untrimmed,
+            parameters: source.parameters,
             around_mm: source.around_mm,
         };
         let file = source.path.display().to_string();
@@ -81,6 +82,7 @@ pub fn surface_of(wanted: &Face, model: &Arc<Model>) -> Result<Arc<MachinableFac
     let options = Options {
         tolerance_mm: wanted.tolerance_mm,
         untrimmed: wanted.untrimmed,
+        parameters: wanted.parameters,
         around_mm: wanted.around_mm,
     };
     let file = wanted.path.display().to_string();
@@ -97,7 +99,7 @@ pub fn machinable_once(
     number: usize,
     options: &Options,
 ) -> Result<Arc<MachinableFace>, CadError> {
-    type Key = (usize, u64, bool, u64);
+    type Key = (usize, u64, bool, FaceParameters, u64);
     type Last = Option<(Arc<Model>, HashMap<Key, Arc<MachinableFace>>)>;
     static LAST: Mutex<Last> = Mutex::new(None);
     let lock = || LAST.lock().unwrap_or_else(PoisonError::into_inner);
@@ -105,6 +107,7 @@ pub fn machinable_once(
         number,
         options.tolerance_mm.to_bits(),
         options.untrimmed,
+        options.parameters,
         options.around_mm.to_bits(),
     );
     if let Some((of, made)) = lock().as_ref()

@@ -69,6 +69,11 @@ pub struct JobText {
     pub warnings: Vec<String>,
 }
 
+/// Whether the job names the face and its part: a face that ends within its surface has neighbours there.
+const fn is_of_part(surface: &MachinableFace) -> bool {
+    surface.trimmed.is_some() || surface.by_edges
+}
+
 /// The machined side: away from the material if known, otherwise the upper side; written as `"up"` if that side faces up.
 fn side(face: &Face, measures: &Measures) -> (&'static str, f64) {
     let up = measures.facing[2];
@@ -106,7 +111,7 @@ pub fn write_job(
     options: &JobOptions,
 ) -> Result<JobText, CadError> {
     let measures = measure(&surface.spec());
-    let by_region = options.in_part || surface.trimmed.is_some();
+    let by_region = options.in_part || is_of_part(surface);
     let (chosen, sign) = match (by_region, side(face, &measures)) {
         // The surface around a face may face another way than the face.
         (true, (_, sign)) => (if sign > 0.0 { "+" } else { "-" }, sign),
@@ -239,15 +244,16 @@ fn text(
     let of_file = options
         .source
         .as_ref()
-        .filter(|_| options.in_part || surface.trimmed.is_some());
+        .filter(|_| options.in_part || is_of_part(surface));
     if let Some((path, tolerance_mm)) = of_file {
         // Its region is made when the job is read.
         let _ = writeln!(
             out,
-            "[surface]\nkind = \"file\"\npath = {path:?}\nface = {}\ntolerance_mm = {tolerance_mm}\n\n\
+            "[surface]\nkind = \"file\"\npath = {path:?}\nface = {}\ntolerance_mm = {tolerance_mm}\nparameters = {:?}      # \"edges\": of four edges of the face where it has them; \"surface\"\n\n\
              # What must not be cut; the region of the face is what the tool reaches without cutting it.\n\
              [part]\npath = {path:?}",
-            face.number
+            face.number,
+            surface.parameters.name(),
         );
     } else {
         write_surface(&mut out, &surface.nurbs);

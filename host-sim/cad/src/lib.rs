@@ -3,6 +3,7 @@
 //! ```text
 //! file ──reader.rs──► Face: Surface (exact, mm, placed) + boundary      a separate program, `host-sim/cad-reader`
 //!                     │ outline.rs     boundary -> a rectangle of (u, v), and whether the boundary is that rectangle
+//!                     │ plane.rs, edges/   parameters that suit the face, where those of the file do not
 //!                     ▼
 //!                   Surface over a rectangle
 //!                     │ exact.rs       analytic -> rational quadratics; B-splines by knot insertion; degree <= 3
@@ -15,6 +16,7 @@
 
 mod crossings;
 mod curve;
+mod edges;
 mod error;
 mod exact;
 mod faces;

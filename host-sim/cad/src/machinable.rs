@@ -1,5 +1,6 @@
 //! Conversion of a face to the surface of a job: exact up to the degree of the core, otherwise fitted within a tolerance.
 
+use super::edges::along_edges;
 use super::exact::exact;
 use super::fit::{Deviation, FitError, Knots, deviation, fit};
 use super::plane::suited;
@@ -7,7 +8,7 @@ use super::spline::SplineSurface;
 use super::surface::Periodic;
 use super::trim::{Polygon, trim};
 use super::{CadError, Face, Outline, Surface, outline};
-use job::{NurbsSpec, SurfaceSpec};
+use job::{FaceParameters, NurbsSpec, SurfaceSpec};
 use job_file::{TOLERANCE_DEFAULT_MM, TOLERANCE_MAX_MM};
 use machine::prepare::{patch_count, streamed_patch_count};
 
@@ -23,6 +24,8 @@ pub struct Options {
     pub tolerance_mm: f64,
     /// Accept a trimmed face, as the rectangle around its boundary.
     pub untrimmed: bool,
+    /// The parameters: with [`FaceParameters::Edges`] a face that is whole in them ends on its edges, with [`FaceParameters::Surface`] the surface goes on beyond it.
+    pub parameters: FaceParameters,
     /// How far the surface goes on beyond the face, where it has more, mm.
     pub around_mm: f64,
 }
@@ -32,6 +35,7 @@ impl Default for Options {
         Self {
             tolerance_mm: TOLERANCE_DEFAULT_MM,
             untrimmed: false,
+            parameters: FaceParameters::Edges,
             around_mm: 0.0,
         }
     }
@@ -64,6 +68,10 @@ pub struct MachinableFace {
     pub trimmed: Option<Vec<Polygon>>,
     /// Patches on the board.
     pub patches: usize,
+    /// Its parameters are between four edges of the face that are not iso-parametric lines of its surface.
+    pub by_edges: bool,
+    /// The parameters that were asked for.
+    pub parameters: FaceParameters,
 }
 
 impl MachinableFace {
@@ -156,7 +164,16 @@ pub fn machinable(file: &str, face: &Face, options: &Options) -> Result<Machinab
         Some((face, outline)) => (face, outline),
         None => (face, &outline),
     };
-    let grown = grown(&face.surface, outline.rectangle, options.around_mm);
+    let is_by_edges = !options.untrimmed && options.parameters == FaceParameters::Edges;
+    if is_by_edges && let Some(made) = between_edges(file, face, options, outline, &name) {
+        return Ok(made);
+    }
+    let around_mm = if is_by_edges && outline.trimmed.is_none() {
+        0.0
+    } else {
+        options.around_mm
+    };
+    let grown = grown(&face.surface, outline.rectangle, around_mm);
     let made = converted(file, face, options, outline, grown, &name);
     let (mut made, rectangle) = match made {
         // What is around a face is wanted, the face is needed.
@@ -179,6 +196,23 @@ pub fn machinable(file: &str, face: &Face, options: &Options) -> Result<Machinab
         made.trimmed = Some(polygons);
     }
     Ok(made)
+}
+
+/// A trimmed face with parameters between its four edges, where that is exact and the store holds it.
+fn between_edges(
+    file: &str,
+    face: &Face,
+    options: &Options,
+    outline: &Outline,
+    name: &str,
+) -> Option<MachinableFace> {
+    let (face, outline) = along_edges(face, outline)?;
+    let made = converted(file, &face, options, &outline, outline.rectangle, name).ok()?;
+    let fits = made.form == Form::Exact && patch_count(&centred(&made.nurbs)).is_ok();
+    fits.then_some(MachinableFace {
+        by_edges: true,
+        ..made
+    })
 }
 
 /// A rectangle of parameters with more of the surface around it, as far as there is any.
@@ -246,6 +280,8 @@ fn converted(
                 outline: outline.clone(),
                 trimmed: None,
                 patches,
+                by_edges: false,
+                parameters: options.parameters,
             };
             match patch_count(&surface) {
                 Ok(patches) => return Ok(exact(patches)),
@@ -309,6 +345,8 @@ fn fitted(
         outline: outline.clone(),
         trimmed: None,
         patches,
+        by_edges: false,
+        parameters: options.parameters,
     })
 }
 

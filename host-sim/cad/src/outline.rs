@@ -201,7 +201,7 @@ fn off_the_pole(places: &mut [[f64; 2]], polar: &[[bool; 2]], k: usize) {
 }
 
 /// Whether the edge lies on a line of constant parameter k.
-fn constant(surface: &Surface, edge: &[[f64; 2]], k: usize) -> bool {
+pub(super) fn constant(surface: &Surface, edge: &[[f64; 2]], k: usize) -> bool {
     let [low, high] = edge
         .iter()
         .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], place| {

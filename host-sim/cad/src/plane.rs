@@ -22,9 +22,9 @@ const OUTER: f64 = 2.0;
 
 /// A circle.
 #[derive(Clone, Copy)]
-struct Circle {
-    centre: DVec3,
-    radius: f64,
+pub(super) struct Circle {
+    pub(super) centre: DVec3,
+    pub(super) radius: f64,
 }
 
 /// The face of a plane with parameters that suit it, and its outline with those; `None` where those of the file do.
@@ -139,7 +139,7 @@ fn polar(loops: &[Vec<Edge>], normal: DVec3) -> Option<Surface> {
 }
 
 /// The circle of an edge.
-fn circle(edge: &Edge, normal: DVec3) -> Option<Circle> {
+pub(super) fn circle(edge: &Edge, normal: DVec3) -> Option<Circle> {
     let at = |share: usize| edge.get(share * (edge.len() - 1) / 6).copied();
     // Three places that are not near each other, on a whole circle too.
     let (a, b, c) = (at(0)?, at(2)?, at(4)?);
@@ -279,8 +279,8 @@ mod tests {
     /// What is neither is turned along its longest edges, and stays trimmed.
     #[test]
     fn another_face_is_turned_to_its_edges() {
-        let corners = [[0.0, 0.0], [12.0, 0.0], [10.0, 5.0], [0.0, 5.0]];
-        let edges = (0..4).map(|k| line(corners[k], corners[(k + 1) % 4])).collect();
+        let corners = [[0.0, 0.0], [12.0, 0.0], [10.0, 4.0], [8.0, 5.0], [0.0, 5.0]];
+        let edges = (0..5).map(|k| line(corners[k], corners[(k + 1) % 5])).collect();
         let made = machinable("plane.step", &face(vec![edges]), &Options::default()).unwrap();
         assert!(made.trimmed.is_some());
         let [[u0, u1], [v0, v1]] = made.outline.rectangle;
@@ -289,7 +289,7 @@ mod tests {
             untrimmed: true,
             ..Options::default()
         };
-        let edges = (0..4).map(|k| line(corners[k], corners[(k + 1) % 4])).collect();
+        let edges = (0..5).map(|k| line(corners[k], corners[(k + 1) % 5])).collect();
         let made = machinable("plane.step", &face(vec![edges]), &untrimmed).unwrap();
         let [[u0, u1], _] = made.outline.rectangle;
         assert!((u1 - u0 - 12.0 * 0.3_f64.cos()).abs() < 1e-6);

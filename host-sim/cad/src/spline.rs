@@ -220,6 +220,72 @@ impl SplineCurve {
     pub fn rational(&self) -> bool {
         self.poles.iter().any(|pole| pole[3] != self.poles[0][3])
     }
+
+    /// The same the other way round, on the same range.
+    pub(super) fn reversed(&self) -> Self {
+        let [start, end] = self.axis.domain();
+        Self {
+            axis: Axis {
+                degree: self.axis.degree,
+                knots: self
+                    .axis
+                    .knots
+                    .iter()
+                    .rev()
+                    .map(|knot| start + end - knot)
+                    .collect(),
+            },
+            poles: self.poles.iter().rev().copied().collect(),
+        }
+    }
+
+    /// The same curve with this degree, at least its own: each span is raised by itself (P&T 5.5).
+    pub(super) fn raised(&self, degree: usize) -> Self {
+        let mut curve = self.clone();
+        while curve.axis.degree < degree {
+            curve = curve.raised_once();
+        }
+        curve
+    }
+
+    fn raised_once(&self) -> Self {
+        let p = self.axis.degree;
+        let mut curve = self.clone();
+        let breaks = self.axis.breaks();
+        for knot in &breaks[1..breaks.len() - 1] {
+            while curve.axis.multiplicity(*knot) < p {
+                insert(&mut curve.axis, &mut curve.poles, *knot);
+            }
+        }
+        let mut poles = vec![curve.poles[0]];
+        for span in 0..breaks.len() - 1 {
+            let bezier = &curve.poles[span * p..=(span + 1) * p];
+            poles.extend((1..=p).map(|i| bezier[i].blend(&bezier[i - 1], i as f64 / (p + 1) as f64)));
+            poles.push(bezier[p]);
+        }
+        let last = breaks.len() - 1;
+        let knots = breaks.iter().enumerate().flat_map(|(index, knot)| {
+            let times = if index == 0 || index == last { p + 2 } else { p + 1 };
+            vec![*knot; times]
+        });
+        Self {
+            axis: Axis {
+                degree: p + 1,
+                knots: knots.collect(),
+            },
+            poles,
+        }
+    }
+
+    /// Inserts the knots of an axis of the same degree and range that this curve lacks. Exact; a knot that equals one of this curve to rounding is taken for it.
+    pub(super) fn take_knots(&mut self, of: &Axis) {
+        for knot in of.breaks() {
+            let own = self.axis.snapped(knot);
+            while self.axis.multiplicity(own) < of.multiplicity(knot) {
+                insert(&mut self.axis, &mut self.poles, own);
+            }
+        }
+    }
 }
 
 /// A B-spline surface.

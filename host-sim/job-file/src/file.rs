@@ -3,7 +3,7 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-use job::{FaceReach, Job, JobError, PartSource, Region, SurfaceSpec};
+use job::{FaceParameters, FaceReach, Job, JobError, PartSource, Region, SurfaceSpec};
 
 use crate::section::Section;
 
@@ -33,6 +33,8 @@ pub struct Face {
     pub tolerance_mm: f64,
     /// A trimmed face is machined over the rectangle that encloses it.
     pub untrimmed: bool,
+    /// Its parameters.
+    pub parameters: FaceParameters,
     /// How far the surface goes on beyond the face, where it has more, mm.
     pub around_mm: f64,
 }
@@ -142,12 +144,16 @@ pub(crate) fn read(
     faces: &dyn FaceReader,
     around_mm: f64,
 ) -> Result<(FaceSurface, Face), JobError> {
-    section.only(&["kind", "path", "face", "tolerance_mm", "untrimmed"], elsewhere)?;
+    section.only(
+        &["kind", "path", "face", "tolerance_mm", "untrimmed", "parameters"],
+        elsewhere,
+    )?;
     let face = Face {
         path: beside(section, section.text("path")?),
         number: read_number(section, "face")?,
         tolerance_mm: read_tolerance(section)?,
         untrimmed: section.switch("untrimmed")?,
+        parameters: read_parameters(section)?,
         around_mm,
     };
     let surface = faces.surface(&face).map_err(|error| {
@@ -177,6 +183,7 @@ pub(crate) fn source(section: &Section<'_>) -> Result<Option<Face>, JobError> {
         number: read_number(section, "source_face")?,
         tolerance_mm: read_tolerance(section)?,
         untrimmed: true,
+        parameters: FaceParameters::Surface,
         around_mm: 0.0,
     }))
 }
@@ -187,6 +194,18 @@ fn beside(section: &Section<'_>, path: impl AsRef<Path>) -> PathBuf {
         .parent()
         .unwrap_or(Path::new(""))
         .join(path)
+}
+
+/// The parameters of a face.
+fn read_parameters(section: &Section<'_>) -> Result<FaceParameters, JobError> {
+    if !section.has("parameters") {
+        return Ok(FaceParameters::default());
+    }
+    let all = [FaceParameters::Edges, FaceParameters::Surface];
+    section.choice(
+        "parameters",
+        &all.map(|parameters| (parameters.name(), parameters)),
+    )
 }
 
 /// The tolerance of an approximation, mm.

@@ -184,6 +184,7 @@ fn parse_on(
         face: face.number,
         tolerance_mm: face.tolerance_mm,
         untrimmed: face.untrimmed,
+        parameters: face.parameters,
         around_mm: face.around_mm,
         trimmed,
         surface: unplaced,

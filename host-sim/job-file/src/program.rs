@@ -1,8 +1,8 @@
 //! A job of many faces: one file with `[part]` and a `[[face]]` for each, in the order in which they are machined. Each becomes a job of its own, `FILE#FACE`:
 //!
 //! ```text
-//! [part] path ───────────► [surface] kind = "file", path        [[face]] face, tolerance_mm ──► [surface]
-//! [tool] [cut] [machine] ... as they are                         [[face]] everything else ────► [cut]
+//! [part] path ───────────► [surface] kind = "file", path        [[face]] face, tolerance_mm, parameters ──► [surface]
+//! [tool] [cut] [machine] ... as they are                         [[face]] everything else ────────────────► [cut]
 //! ```
 
 use std::path::{Path, PathBuf};
@@ -13,7 +13,7 @@ use toml::{Table, Value};
 use super::text;
 
 /// Keys of `[[face]]` that belong to the surface.
-const OF_SURFACE: [&str; 2] = ["face", "tolerance_mm"];
+const OF_SURFACE: [&str; 3] = ["face", "tolerance_mm", "parameters"];
 /// Sections that a job of many faces may not have.
 const FOREIGN: [&str; 2] = ["surface", "region"];
 

@@ -15,7 +15,7 @@ const TURN_TOLERANCE_RAD: f64 = 1e-9;
 const RADIUS_TOLERANCE_MM: f64 = 1e-9;
 
 /// Every key of any kind of surface, and the kinds that have the key.
-const KEYS: [(&str, &str); 16] = [
+const KEYS: [(&str, &str); 17] = [
     ("radius_mm", "only a revolved surface has it"),
     ("height_mm", "only a revolved surface has it"),
     ("v_rad", "only a revolved surface has it; here the range is `v`"),
@@ -32,6 +32,7 @@ const KEYS: [(&str, &str); 16] = [
     ("source", "only a nurbs surface has it"),
     ("source_face", "only a nurbs surface has it"),
     ("untrimmed", "only a surface of kind \"file\" has it"),
+    ("parameters", "only a surface of kind \"file\" has it"),
 ];
 
 /// The kind of surface.

@@ -18,7 +18,8 @@ pub use machine::{
     PERIOD_RANGE_US, Ratio, Spindle, SpindleDrive, StepOutput,
 };
 pub use origin::{
-    AlongChoice, CadSource, DirectionTrial, FaceReach, Origin, PartSource, SpacingTrial, StartChoice,
+    AlongChoice, CadSource, DirectionTrial, FaceParameters, FaceReach, Origin, PartSource, SpacingTrial,
+    StartChoice,
 };
 pub use region::Region;
 pub use setup::{Block, Fixture, HolderPart, Setup, TOOL_SIZE_MAX_MM, ToolBody};

@@ -53,6 +53,27 @@ pub enum StartChoice {
     Chosen([SpacingTrial; 2]),
 }
 
+/// The parameters of a face of a CAD file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum FaceParameters {
+    /// Along the four edges of the face, which are then those of the surface; where it has no such edges, as [`Self::Surface`].
+    #[default]
+    Edges,
+    /// Those of its surface, which goes on beyond the face where there is more of it.
+    Surface,
+}
+
+impl FaceParameters {
+    /// Name in job files.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Edges => "edges",
+            Self::Surface => "surface",
+        }
+    }
+}
+
 /// The face of a CAD file from which a job's surface was made.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CadSource {
@@ -64,6 +85,8 @@ pub struct CadSource {
     pub tolerance_mm: f64,
     /// A trimmed face is machined over the rectangle that encloses it.
     pub untrimmed: bool,
+    /// Its parameters.
+    pub parameters: FaceParameters,
     /// The job's surface before its placement, with the parameters of the face if it is an approximation.
     pub surface: SurfaceSpec,
     /// How far the surface goes on beyond the face, where it has more, mm.

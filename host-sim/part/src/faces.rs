@@ -16,7 +16,7 @@ use crate::region::{Made, Request};
 use crate::tool::{Reason, Tool};
 
 /// The method by which regions are made: others in a cache are not used.
-const METHOD: u32 = 5;
+const METHOD: u32 = 6;
 /// Folder beside the job in which regions are kept.
 const CACHE: &str = ".isofeed";
 /// How deep the tool may enter the part, mm, where no part says it: only the grid of a face alone depends on it.
@@ -207,6 +207,7 @@ impl Asked {
             number: source.face,
             tolerance_mm: source.tolerance_mm,
             untrimmed: source.untrimmed,
+            parameters: source.parameters,
             around_mm: source.around_mm,
         };
         let surface = surface_of(&wanted, &model)?;
@@ -316,9 +317,10 @@ fn cache_file(job: &Job, source: &CadSource) -> Option<PathBuf> {
     };
     let part_rules = job.origin.part().map(|of| (of.tolerance_mm, of.steepest_deg));
     let rules = format!(
-        "{METHOD} {} {} {} {:?} {:?} {} {:?} {:?} {:?}",
+        "{METHOD} {} {} {:?} {} {:?} {:?} {} {:?} {:?} {:?}",
         source.face,
         source.tolerance_mm,
+        source.parameters,
         source.around_mm,
         placement(job).rows,
         Tool::of(job),

@@ -284,7 +284,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let options = Options {
         tolerance_mm: arguments.tolerance,
         untrimmed: arguments.untrimmed,
-        around_mm: 0.0,
+        ..Options::default()
     };
     if !arguments.list && arguments.output.is_none() {
         return Err(Failure::input(

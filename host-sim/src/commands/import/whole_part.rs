@@ -11,7 +11,7 @@ mod summary;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use job::FaceReach;
+use job::{FaceParameters, FaceReach};
 use rayon::prelude::*;
 
 use super::super::out::say;
@@ -96,6 +96,7 @@ pub(super) fn command(arguments: &Arguments, file: &str, model: &Arc<Model>, out
     let options = Options {
         tolerance_mm: arguments.tolerance,
         untrimmed: false,
+        parameters: FaceParameters::Edges,
         around_mm: STEP_OVERS_AROUND * (8.0 * radius_mm * scallop_mm).sqrt(),
     };
     let tool = Tool::new(radius_mm, &job::ToolBody::default());
@@ -105,6 +106,10 @@ pub(super) fn command(arguments: &Arguments, file: &str, model: &Arc<Model>, out
         .par_iter()
         .map(|face| machinable_once(file, model, face.number, &options))
         .collect();
+    let by_surface = Options {
+        parameters: FaceParameters::Surface,
+        ..options
+    };
     let setup = match arguments.up {
         Up::Auto => best_side(model, &faces, &made, &tool, scallop_mm),
         up => Setup::new(up, model, scallop_mm),
@@ -125,10 +130,15 @@ pub(super) fn command(arguments: &Arguments, file: &str, model: &Arc<Model>, out
     }
     std::fs::create_dir_all(&folder).map_err(|error| super::super::cannot_write(&folder, &error))?;
     let bar = progress(faces.len() as u64, "regions");
-    let each = faces.par_iter().zip(&made).map(|(face, made)| {
-        let mut found = outcome(arguments, file, face, made.as_deref(), &asked, &folder);
-        if let (Ok(made), true) = (made, face.surface.kind() != "plane") {
-            found.cells = cells(&asked, face, made, &found);
+    let each = faces.par_iter().zip(made).map(|(face, made)| {
+        let mut all = vec![made];
+        // Lines between edges that are not parallel spread: the surface's own parameters may take less time.
+        if all[0].as_ref().is_ok_and(|made| made.by_edges) {
+            all.push(machinable_once(file, model, face.number, &by_surface));
+        }
+        let mut found = outcome(arguments, file, face, &all, &asked, &folder);
+        if let (Some(made), true) = (found.made.clone(), face.surface.kind() != "plane") {
+            found.cells = cells(&asked, face, &made, &found);
         }
         bar.inc(1);
         found
@@ -150,6 +160,7 @@ pub(super) fn reaches(
     let options = Options {
         tolerance_mm: arguments.tolerance,
         untrimmed: false,
+        parameters: FaceParameters::Edges,
         around_mm: STEP_OVERS_AROUND * (8.0 * radius_mm * scallop_mm).sqrt(),
     };
     let setup = Setup::new(Up::PlusZ, model, scallop_mm);

@@ -42,6 +42,15 @@ pub(super) struct Effort {
     pub(super) ends: Option<[[f64; 2]; 2]>,
 }
 
+/// Whether passes of this time and share that they leave are better than others: less time, of those that leave little, else less that is left.
+pub(super) fn is_better([time_s, left]: [f64; 2], [other_s, other_left]: [f64; 2]) -> bool {
+    match [left, other_left].map(|left| left <= LEFT_SHARE) {
+        [true, true] => time_s < other_s,
+        [false, false] => left < other_left,
+        [is_better, _] => is_better,
+    }
+}
+
 /// A line of constant side parameter, and its intervals.
 struct Line {
     side: f64,
@@ -56,24 +65,43 @@ const fn swapped(along: Along, [u, v]: [f64; 2]) -> [f64; 2] {
     }
 }
 
+/// Ranges of `[path, side]`.
+const fn swapped_ranges(along: Along, [u, v]: [[f64; 2]; 2]) -> [[f64; 2]; 2] {
+    match along {
+        Along::U => [u, v],
+        Along::V => [v, u],
+    }
+}
+
 impl Passes<'_> {
     /// The direction that takes less time, of those that leave little; else the one that leaves less.
     pub(super) fn best(&self) -> Effort {
         let [u, v] = [Along::U, Along::V].map(|along| self.effort(along));
-        let leaves_little = [&u, &v].map(|effort| effort.left <= LEFT_SHARE);
-        let is_v = match leaves_little {
-            [true, true] => v.time_s < u.time_s,
-            [false, false] => v.left < u.left,
-            [_, is_v] => is_v,
-        };
+        let is_v = is_better([v.time_s, v.left], [u.time_s, u.left]);
         if is_v { v } else { u }
     }
 
-    /// Lengths of the derivatives along a pass and across it.
-    fn speeds(&self, along: Along, path: f64, side: f64) -> [f64; 2] {
+    /// Length of the derivative along a pass, and of that across it the whole and what is at right angles.
+    fn speeds(&self, along: Along, path: f64, side: f64) -> [f64; 3] {
         let [u, v] = swapped(along, [path, side]);
         let at = self.surface.at(u, v);
-        swapped(along, [at.u.length(), at.v.length()])
+        let [path, side] = match along {
+            Along::U => [at.u, at.v],
+            Along::V => [at.v, at.u],
+        };
+        let [speed, whole] = [path.length(), side.length()];
+        let across = if speed > 0.0 {
+            path.cross(side).length() / speed
+        } else {
+            whole
+        };
+        [speed, whole, across]
+    }
+
+    /// How much a step across is where a pass ends on the surface's boundary, which may be slanted: the crest there lies between the end of one pass and the foot on the other.
+    fn across_end(&self, along: Along, path: f64, side: f64) -> f64 {
+        let [_, whole, across] = self.speeds(along, path, side);
+        2.0 * across * whole / (across + whole).max(f64::MIN_POSITIVE)
     }
 
     pub(super) fn effort(&self, along: Along) -> Effort {
@@ -138,14 +166,23 @@ impl Passes<'_> {
             .collect();
         crossings.sort_by(f64::total_cmp);
         let mut intervals = Vec::new();
+        let [ends, _] = swapped_ranges(along, self.surface.domain());
         let (mut widest, mut time_s) = (0.0_f64, 0.0);
         for [from, to] in crossings.as_chunks::<2>().0 {
             let mut length_mm = 0.0;
             for part in 0..PARTS {
                 let share = (f64::from(part) + 0.5) / f64::from(PARTS);
-                let [speed, across] = self.speeds(along, from + share * (to - from), side);
+                let [speed, _, across] = self.speeds(along, from + share * (to - from), side);
                 length_mm += speed * (to - from) / f64::from(PARTS);
                 widest = widest.max(across);
+            }
+            for end in [*from, *to] {
+                if ends
+                    .iter()
+                    .any(|of| (of - end).abs() <= 1e-6 * (ends[1] - ends[0]))
+                {
+                    widest = widest.max(self.across_end(along, end, side));
+                }
             }
             if length_mm >= LEAST_STEPS * self.step_over_mm {
                 time_s += length_mm / self.feed_mm_s + INTERVAL_S;
@@ -161,7 +198,7 @@ impl Passes<'_> {
         let (mut all, mut left) = (0.0, 0.0);
         for (place, area) in self.places {
             let [path, side] = swapped(along, *place);
-            let [speed, across] = self.speeds(along, path, side);
+            let [speed, _, across] = self.speeds(along, path, side);
             let above = lines.partition_point(|line| line.side < side);
             let near = &lines[above.saturating_sub(BESIDE)..(above + BESIDE).min(lines.len())];
             let is_served = near.iter().any(|line| {

@@ -119,7 +119,7 @@ pub(super) fn page(
         .collect();
     let sums = Sums::of(outcomes);
     let entry = |state: State, words: String| (Some(tint(state)), words);
-    let passes_min = outcomes.iter().map(|outcome| outcome.passes_s).sum::<f64>() / 60.0;
+    let passes_min = outcomes.iter().map(Outcome::passes_s).sum::<f64>() / 60.0;
     let share = Sums::share(sums.region, sums.reachable);
     let legend = [
         entry(

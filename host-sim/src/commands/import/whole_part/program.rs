@@ -62,8 +62,11 @@ pub(super) fn program(
         let along = arguments.along.as_deref().unwrap_or(outcome.along);
         let _ = write!(
             out,
-            "\n[[face]]\nface = {}\ntolerance_mm = {}\nalong = {along:?}\nside = {:?}    # {share:.1} % of the face\n",
-            outcome.number, arguments.tolerance, outcome.side,
+            "\n[[face]]\nface = {}\ntolerance_mm = {}\nparameters = {:?}\nalong = {along:?}\nside = {:?}    # {share:.1} % of the face\n",
+            outcome.number,
+            arguments.tolerance,
+            outcome.parameters.name(),
+            outcome.side,
         );
     }
     out

@@ -127,7 +127,7 @@ pub(super) fn print(
     if sums.unknown > 0 {
         say!("  {} faces are not known", sums.unknown);
     }
-    let passes_s: f64 = order.iter().map(|index| outcomes[*index].passes_s).sum();
+    let passes_s: f64 = order.iter().map(|index| outcomes[*index].passes_s()).sum();
     say!(
         "  passes       about {:.1} min; `verify` tells the time",
         passes_s / 60.0
