@@ -1,5 +1,7 @@
 //! The part of a surface that a job machines.
 
+use crate::Along;
+
 /// A region of a surface: the points that closed polygons of (u, v) enclose an odd number of times (even-odd rule). A polygon inside another
 /// one is a hole; polygons may touch.
 #[derive(Clone, Debug, PartialEq)]
@@ -64,9 +66,130 @@ impl Region {
     }
 }
 
+/// Share of the longest line near an end of a region from which on a line there is as good as it.
+const FULL_SHARE: f64 = 0.98;
+/// Lines near an end that are looked at beside those through vertices.
+const LINES_AT_END: u32 = 16;
+
+impl Region {
+    /// `[path, side]` of (u, v), and back.
+    const fn swapped(along: Along, [u, v]: [f64; 2]) -> [f64; 2] {
+        match along {
+            Along::U => [u, v],
+            Along::V => [v, u],
+        }
+    }
+
+    /// Length of a line of constant side parameter in the region, in the path parameter.
+    fn length_on(&self, along: Along, side: f64) -> f64 {
+        let edges = self.edges().map(|ends| ends.map(|end| Self::swapped(along, end)));
+        let mut crossings: Vec<f64> = edges
+            .filter(|[a, b]| (a[1] <= side) != (b[1] <= side))
+            .map(|[a, b]| a[0] + (side - a[1]) / (b[1] - a[1]) * (b[0] - a[0]))
+            .collect();
+        crossings.sort_by(f64::total_cmp);
+        let pairs = crossings.as_chunks::<2>().0;
+        pairs.iter().map(|[from, to]| to - from).sum()
+    }
+
+    /// The first and the last side parameter whose line is as long as any that is at most so far `within` from the region's end. On an end that is nearly parallel to the lines the
+    /// last one would be a sliver, and what is below it a step-over from the one before.
+    #[must_use]
+    pub fn full_lines(&self, along: Along, within: f64) -> [f64; 2] {
+        let [u, v] = self.extent();
+        let [_, ends] = match along {
+            Along::U => [u, v],
+            Along::V => [v, u],
+        };
+        let within = within.min(0.25 * (ends[1] - ends[0]));
+        let vertices: Vec<f64> = self
+            .edges()
+            .map(|[vertex, _]| Self::swapped(along, vertex)[1])
+            .collect();
+        [(ends[0], 1.0), (ends[1], -1.0)].map(|(end, inwards)| {
+            let last = end + inwards * within;
+            let even = (0..=LINES_AT_END).map(|k| f64::from(k) / f64::from(LINES_AT_END));
+            let mut lines: Vec<f64> = even
+                .map(|share| end + share * (last - end))
+                .chain(
+                    vertices
+                        .iter()
+                        .copied()
+                        .filter(|side| (side - end) * inwards <= within),
+                )
+                // On the vertex itself a line has the length of one side of it.
+                .map(|side| side + 1e-9 * (last - end))
+                .collect();
+            lines.sort_by(|a, b| (a * inwards).total_cmp(&(b * inwards)));
+            let lengths: Vec<f64> = lines.iter().map(|side| self.length_on(along, *side)).collect();
+            let longest = lengths.iter().copied().fold(0.0, f64::max);
+            let full = lengths.iter().position(|length| *length >= FULL_SHARE * longest);
+            match full {
+                Some(index) if index > 0 => lines[index],
+                _ => end,
+            }
+        })
+    }
+
+    /// What of the region lies between two lines of constant side parameter.
+    #[must_use]
+    pub fn between(&self, along: Along, [low, high]: [f64; 2]) -> Self {
+        let cut = |polygon: &[[f64; 2]], side: f64, upwards: f64| {
+            let mut kept: Vec<[f64; 2]> = Vec::with_capacity(polygon.len());
+            let next = polygon.iter().cycle().skip(1);
+            for (from, to) in polygon.iter().zip(next) {
+                let [a, b] = [*from, *to].map(|place| Self::swapped(along, place));
+                let is_in = |place: [f64; 2]| (place[1] - side) * upwards >= 0.0;
+                if is_in(a) {
+                    kept.push(*from);
+                }
+                if is_in(a) != is_in(b) {
+                    let share = (side - a[1]) / (b[1] - a[1]);
+                    kept.push(Self::swapped(along, [a[0] + share * (b[0] - a[0]), side]));
+                }
+            }
+            kept
+        };
+        let loops = self.loops.iter().filter_map(|polygon| {
+            let kept = cut(&cut(polygon, low, 1.0), high, -1.0);
+            (kept.len() > 2).then_some(kept)
+        });
+        Self::new(loops.collect())
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// An end that is slanted by less than what is looked at is cut at its lower end; a flat one, and one that is slanted more, stays.
+    #[test]
+    fn the_last_line_is_no_sliver() {
+        let region = |high: [f64; 2]| {
+            Region::new(vec![vec![
+                [0.0, 0.0],
+                [10.0, 0.0],
+                [10.0, high[0]],
+                [0.0, high[1]],
+            ]])
+        };
+        let lines = |high: [f64; 2]| region(high).full_lines(Along::U, 0.1);
+        assert_eq!(lines([5.0, 5.0]), [0.0, 5.0]);
+        let [first, last] = lines([5.0, 4.95]);
+        assert!(first == 0.0 && (last - 4.95).abs() < 2e-3, "{last}");
+        let [_, last] = lines([5.0, 4.999_999_9]);
+        assert!(last < 5.0 && last > 4.999_999_8, "{last}");
+        // The longest line within reach has a tenth of the length.
+        let [_, last] = lines([5.0, 4.0]);
+        assert!((last - 4.9).abs() < 7e-3, "{last}");
+        let cut = region([5.0, 4.95]).between(Along::U, [0.5, 4.95]);
+        assert_eq!(cut.extent(), [[0.0, 10.0], [0.5, 4.95]]);
+        assert!(cut.contains([9.0, 4.9]) && !cut.contains([9.0, 4.97]));
+        // The other way round.
+        let turned = Region::new(vec![vec![[0.0, 0.0], [0.0, 10.0], [5.0, 10.0], [4.95, 0.0]]]);
+        let [_, last] = turned.full_lines(Along::V, 0.1);
+        assert!((last - 4.95).abs() < 2e-3, "{last}");
+    }
 
     #[test]
     fn a_loop_inside_another_is_a_hole() {

@@ -50,6 +50,7 @@ pub(crate) fn settle(job: &mut Job) {
             costs.cells(&pieces)
         }
     };
+    let cells = without_slivers(job, region, cells);
     let vertices = cells.iter().flatten().map(Vec::len).sum::<usize>();
     if let Some(region) = &mut job.region {
         region.cells = if vertices > Region::VERTICES_MAX {
@@ -58,6 +59,46 @@ pub(crate) fn settle(job: &mut Job) {
             cells
         };
     }
+}
+
+/// How far from an end of a cell its last line may be, in step-overs of a plane: what is beyond it stays below the scallop height down to a convex radius of a tenth of the ball's.
+const END_STEPS: f64 = 0.15;
+/// Ends that are nearer to the surface's boundary than this share of the side parameter's range are on it: passes follow it.
+const ON_BOUNDARY: f64 = 1e-9;
+
+/// The cells of a region that is made from a face, without ends on which the first or the last line would be a sliver.
+fn without_slivers(job: &Job, region: &Region, cells: Vec<Vec<Polygon>>) -> Vec<Vec<Polygon>> {
+    if job.origin.reach().is_none() || job.spacing.is_constant() {
+        return cells;
+    }
+    let surface = SurfaceEvaluator::new(&job.surface);
+    let step_mm = (8.0 * job.radius_mm * job.scallop_mm).sqrt();
+    let [u, v] = job.surface.domain();
+    let sides = if job.along == Along::U { v } else { u };
+    let mut is_cut = false;
+    let whole = cells.is_empty().then(|| region.loops.clone());
+    let trimmed: Vec<Vec<Polygon>> = whole
+        .into_iter()
+        .chain(cells.clone())
+        .map(|loops| {
+            let cell = Region::new(loops);
+            let [[u0, u1], [v0, v1]] = cell.extent();
+            let frame = surface.at(0.5 * (u0 + u1), 0.5 * (v0 + v1));
+            let (across_mm, ends) = match job.along {
+                Along::U => (frame.v.length(), [v0, v1]),
+                Along::V => (frame.u.length(), [u0, u1]),
+            };
+            let full = cell.full_lines(job.along, END_STEPS * step_mm / across_mm);
+            let on_boundary = |k: usize| (ends[k] - sides[k]).abs() <= ON_BOUNDARY * (sides[1] - sides[0]);
+            let lines = [0, 1].map(|k| if on_boundary(k) { ends[k] } else { full[k] });
+            if lines == ends {
+                return cell.loops;
+            }
+            is_cut = true;
+            cell.between(job.along, lines).loops
+        })
+        .collect();
+    if is_cut { trimmed } else { cells }
 }
 
 /// What links and passes cost.

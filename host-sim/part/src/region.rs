@@ -223,7 +223,8 @@ impl Request<'_> {
         made.inside_mm2 = reached
             .filter(|((place, _), _)| inside.contains(*place))
             .map(|((_, area), _)| area)
-            .sum();
+            // The sum of none is -0.
+            .fold(0.0, |sum, area| sum + area);
         made
     }
 
