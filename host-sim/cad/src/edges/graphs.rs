@@ -162,7 +162,8 @@ impl Chain<'_> {
     /// v at u, and its derivative; beyond an end, those of the curve that goes on.
     fn at(&self, u: f64) -> Option<[f64; 2]> {
         // The interval that holds u, or the nearest one.
-        let mut best: Option<(f64, &Edge, &[[f64; 2]], usize, f64)> = None;
+        let mut least = f64::INFINITY;
+        let mut best = None;
         for (points, places) in &self.pieces {
             let middle = 0.5 * (places.first()?[0] + places.last()?[0]);
             let u = self
@@ -171,12 +172,13 @@ impl Chain<'_> {
             for (index, ends) in places.windows(2).enumerate() {
                 let (low, high) = (ends[0][0].min(ends[1][0]), ends[0][0].max(ends[1][0]));
                 let off = (low - u).max(u - high).max(0.0);
-                if best.is_none_or(|(least, ..)| off < least) {
-                    best = Some((off, points, places, index, u));
+                if off < least {
+                    least = off;
+                    best = Some((points, places, index, u));
                 }
             }
         }
-        let (_, points, places, index, u) = best?;
+        let (points, places, index, u) = best?;
         let near = places[index];
         let place = |share: f64| {
             self.surface

@@ -236,7 +236,7 @@ impl Passes<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::Passes;
+    use super::{LEFT_SHARE, Passes};
     use job::{Along, Region};
 
     /// A plane of 20 mm x 10 mm whose region ends on a line that is slanted by 1 in 20 to u: passes along u take less time, but leave a strip there.
@@ -263,7 +263,7 @@ mod tests {
         };
         let [u, v] = [Along::U, Along::V].map(|along| passes.effort(along));
         assert!(u.time_s < v.time_s, "{} {}", u.time_s, v.time_s);
-        assert!(u.left > 0.01 && v.left < 0.001, "{} {}", u.left, v.left);
+        assert!(u.left > LEFT_SHARE && v.left < 0.001, "{} {}", u.left, v.left);
         assert_eq!(passes.best().along, Along::V);
         // Without the slanted end nothing is left, and the faster one is taken.
         let whole = Region::new(vec![vec![[0.0, 0.0], [20.0, 0.0], [20.0, 6.5], [0.0, 6.5]]]);
