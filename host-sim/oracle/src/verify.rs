@@ -238,25 +238,41 @@ impl Verifier {
         if last.is_some_and(|last| !self.is_cell_done(last)) {
             return false;
         }
+        // A cell that holds no pass for certain may touch the next one where that begins: then it is the next one.
+        let mut touched = None;
         for index in self.cell_index + 1..self.oracle.cells.len() {
             let cell = self.oracle.of_cell(index);
-            if cell.is_first_line(start) {
-                (self.cell, self.cell_index) = (cell, index);
-                return true;
-            }
             let [first, last] = cell.pass_range();
-            if !cell.is_empty_between(first, last) {
-                return false;
+            let (is_first_line, is_empty) = (cell.is_first_line(start), cell.is_empty_between(first, last));
+            if is_first_line && (!is_empty || touched.is_none()) {
+                touched = Some((cell, index));
+            }
+            if !is_empty {
+                break;
             }
         }
+        if let Some((cell, index)) = touched {
+            (self.cell, self.cell_index) = (cell, index);
+            return true;
+        }
         false
+    }
+
+    /// Whether the pass that begins is the first one: that of the first cell that holds one.
+    fn is_first_pass(&mut self, start: [f64; 2]) -> bool {
+        let [first, last] = self.cell.pass_range();
+        let is_here = self.cell.is_first_line(start);
+        if is_here && !self.cell.is_empty_between(first, last) {
+            return true;
+        }
+        self.enters_cell(None, start) || is_here
     }
 
     /// Begins a pass of a region: on the line of the one before, or on the next one.
     fn begin_interval(&mut self, sample: &PassSample, start: [f64; 2], spot: SampleLocation) {
         let [_, side] = start;
         let Some(before) = self.current else {
-            let is_first = self.cell.is_first_line(start) || self.enters_cell(None, start);
+            let is_first = self.is_first_pass(start);
             self.report.first_on_boundary = sample.pass == 0 && is_first;
             return;
         };
@@ -309,7 +325,7 @@ impl Verifier {
             }
             None if is_region => {
                 let start = [path, side];
-                let is_first = self.cell.is_first_line(start) || self.enters_cell(None, start);
+                let is_first = self.is_first_pass(start);
                 self.report.first_on_boundary = sample.pass == 0 && is_first;
             }
             None => {
