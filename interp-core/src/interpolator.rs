@@ -340,8 +340,19 @@ struct Motion {
     sequencer: Sequencer,
     /// The last tick waited for rows of a streamed job.
     is_starved: bool,
-    /// The first pass was begun at load, and no run has started since.
-    is_begun: bool,
+    /// What is prepared of the next run.
+    start: Start,
+}
+
+/// What is prepared of the next run: its tick has more to do than any other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Start {
+    /// Nothing yet.
+    Due,
+    /// The first pass is begun, or known.
+    Prepared,
+    /// Nothing can be.
+    None,
 }
 
 /// Remaining motion of an aborted run.
@@ -368,7 +379,7 @@ impl Motion {
         program: Program::new(),
         sequencer: Sequencer::START,
         is_starved: false,
-        is_begun: false,
+        start: Start::None,
     };
 
     fn may_load(&self) -> Result<()> {
@@ -398,11 +409,23 @@ impl Motion {
         self.may_load()?;
         self.program.seal()?;
         self.state = State::Ready;
-        self.restart(store);
-        if let Ok(job) = self.program.job(store) {
-            self.is_begun = self.run.prepare_start(&job);
-        }
+        self.prepare_start(store);
         Ok(())
+    }
+
+    /// Prepares the next run.
+    #[inline(never)]
+    fn prepare_start(&mut self, store: &[i32]) {
+        self.restart(store);
+        self.start = match self.program.job(store) {
+            Ok(job) if self.run.prepare_start(&job) => Start::Prepared,
+            _ => Start::None,
+        };
+    }
+
+    /// Whether the next run is to be prepared.
+    fn is_start_due(&self) -> bool {
+        self.start == Start::Due && matches!(self.state, State::Ready | State::Finished)
     }
 
     fn unload(&mut self) -> Result<()> {
@@ -498,6 +521,9 @@ impl Motion {
         if self.is_starved {
             return false;
         }
+        if self.is_start_due() {
+            return true;
+        }
         let header = self.program.header();
         if header.axes.is_none() {
             return self.state == State::Running && self.run.has_to_plan(header.spacing);
@@ -511,6 +537,12 @@ impl Motion {
     #[inline(never)]
     fn plan(&mut self, store: &mut [i32]) {
         if !self.has_to_plan() {
+            return;
+        }
+        if self.is_start_due() {
+            let interval = self.run.last_interval();
+            self.prepare_start(store);
+            self.run.keep_interval(interval);
             return;
         }
         let Self {
@@ -530,6 +562,7 @@ impl Motion {
         }
         if let Ok(job) = program.job(store) {
             run.prepare_front(&job);
+            run.move_ahead(&job, 1.0);
         }
     }
 
@@ -654,7 +687,10 @@ impl Motion {
         let has_limits = self.program.header().axes.is_some();
         self.state = match command {
             Command::Start => {
-                if !core::mem::take(&mut self.is_begun) {
+                if self.start == Start::Prepared {
+                    self.start = Start::Due;
+                    self.run.forget_interval();
+                } else {
                     self.restart(store);
                 }
                 if let Err(fault) = self.program.rewind() {
@@ -669,7 +705,7 @@ impl Motion {
                 match program.job(store) {
                     Ok(job) if has_limits => {
                         if let Some(axes) = &job.header.axes {
-                            let first = run.first_route(&job);
+                            let first = run.take_first_route(&job);
                             sequencer.restart(first, axes);
                             run.expect_pass(sequencer.first_pass());
                         }

@@ -55,6 +55,7 @@ pub(crate) struct Change {
 
 impl Change {
     /// To a goal.
+    #[inline(never)]
     pub(crate) fn new(rates: [f32; 3], goal: f32, duration: f32) -> Self {
         Self {
             to: Quintic::new(rates, goal, duration),
@@ -63,6 +64,7 @@ impl Change {
     }
 
     /// To a pace above 1 and back to 1. Durations of the rise, of the stay and of the return, s.
+    #[inline(never)]
     pub(super) fn above(rates: [f32; 3], top: f32, [rise_s, hold_s, back_s]: [f32; 3]) -> Self {
         Self {
             to: Quintic::new(rates, top, rise_s),
@@ -81,6 +83,7 @@ impl Change {
     }
 
     /// r, r', r'' at a time within its duration.
+    #[inline(never)]
     pub(crate) fn rates(&self, t: f32) -> [f32; 3] {
         match &self.back {
             Some(back) if t > self.to.duration => {

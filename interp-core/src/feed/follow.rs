@@ -77,6 +77,7 @@ impl Follower {
     }
 
     /// One period at this pace, 0 to 1: the arc that the tool moves by, mm.
+    #[inline(never)]
     pub(crate) fn tick(&mut self, plan: &Plan, pace: f32) -> f32 {
         let seconds = pace * plan.limits.period;
         plan.advance(&mut self.cursor, seconds);

@@ -253,11 +253,7 @@ impl<C: Copy> Pace<C> {
     }
 
     fn rates_of_change(&self, ahead: f32) -> [f32; 3] {
-        let time = self.time + ahead;
-        match &self.change {
-            Some(change) if time < change.duration() => change.rates(time),
-            _ => [self.goal, 0.0, 0.0],
-        }
+        rates_after(self.change.as_ref(), self.goal, self.time + ahead)
     }
 
     /// One period: the pace in its middle.
@@ -293,6 +289,27 @@ impl<C: Copy> Pace<C> {
             self.ceiling = 1.0;
             self.is_long_stop = false;
         }
+        pace.at_least(0.0)
+    }
+
+    /// What [`Self::tick`] returns next, if nothing else is wanted until then.
+    pub(crate) fn next(&self, profiles: &Profiles) -> f32 {
+        let half = 0.5 * self.period;
+        let begins = (self.search.as_ref()).filter(|search| search.left == 0 && search.found);
+        let (on_profile, change) = match begins {
+            Some(search) if search.is_profile => {
+                let followed = profiles.next();
+                (Some((followed.begin(), followed)), None)
+            }
+            Some(search) => (None, Some((Some(&search.change), search.goal, half))),
+            None if self.on_profile => (Some((self.place, profiles.followed())), None),
+            None => (None, Some((self.change.as_ref(), self.goal, self.time + half))),
+        };
+        let [pace, _, _] = match (on_profile, change) {
+            (Some((place, followed)), _) => place.rates(followed, half),
+            (_, Some((change, goal, time))) => rates_after(change, goal, time),
+            _ => [0.0; 3],
+        };
         pace.at_least(0.0)
     }
 
@@ -499,5 +516,13 @@ impl<C: Copy> Pace<C> {
     fn slot_of(&self, wanted: f32) -> f32 {
         let periods = truncated(wanted / self.period + 0.99).max(1);
         to_f32(i64::from(periods)) * self.period
+    }
+}
+
+/// r, r', r'' some time after a change to a goal has begun, s.
+fn rates_after(change: Option<&Change>, goal: f32, time: f32) -> [f32; 3] {
+    match change {
+        Some(change) if time < change.duration() => change.rates(time),
+        _ => [goal, 0.0, 0.0],
     }
 }

@@ -248,6 +248,12 @@ impl Profiles {
         if self.second { other } else { one }
     }
 
+    /// The one that was made, which [`Self::swap`] has followed.
+    pub(crate) const fn next(&self) -> &Profile {
+        let [one, other] = &self.lists;
+        if self.second { one } else { other }
+    }
+
     /// The one that is being made.
     pub(crate) const fn made(&mut self) -> &mut Profile {
         let [one, other] = &mut self.lists;

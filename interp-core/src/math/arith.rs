@@ -345,6 +345,39 @@ pub(crate) fn inverse_sqrt(value: f32) -> f32 {
     second + second * (0.5 - half * second * second)
 }
 
+/// Values that are computed here. Given the freedom, LLVM delays a part of the computation to where each value is used, and what it keeps meanwhile does not
+/// fit into the registers of a Cortex-M.
+#[inline(always)]
+#[must_use]
+#[cfg(all(target_arch = "arm", target_abi = "eabihf"))]
+#[allow(unsafe_code, reason = "a fence for values has no stable intrinsic")]
+pub(crate) fn computed(values: [i32; 6], more: f32) -> ([i32; 6], f32) {
+    let ([mut a, mut b, mut c, mut d, mut e, mut f], mut more) = (values, more.to_bits());
+    // SAFETY: no instruction; the registers keep their values.
+    unsafe {
+        core::arch::asm!(
+            "/* {0} {1} {2} {3} {4} {5} {6} */",
+            inout(reg) a,
+            inout(reg) b,
+            inout(reg) c,
+            inout(reg) d,
+            inout(reg) e,
+            inout(reg) f,
+            inout(reg) more,
+            options(nomem, nostack, preserves_flags),
+        );
+    }
+    ([a, b, c, d, e, f], f32::from_bits(more))
+}
+
+/// Values that are computed here.
+#[inline(always)]
+#[must_use]
+#[cfg(not(all(target_arch = "arm", target_abi = "eabihf")))]
+pub(crate) const fn computed(values: [i32; 6], more: f32) -> ([i32; 6], f32) {
+    (values, more)
+}
+
 /// Taylor coefficients of sin(pi/4 t)/t in z = t^2/4, units of 2^-31. Truncation below 1e-11.
 const SINE: [i32; 6] = [
     1_686_629_713,

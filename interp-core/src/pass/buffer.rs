@@ -112,6 +112,15 @@ impl PatchBuffer {
         self.prepared = is_sound.then_some((*route, piece));
     }
 
+    /// The patch that is prepared for the next pass, and its piece.
+    pub(crate) const fn prepared(&self) -> Option<(&Patch, &Piece)> {
+        let [first, second] = &self.patches;
+        match &self.prepared {
+            Some((_, piece)) => Some((if self.second { first } else { second }, piece)),
+            None => None,
+        }
+    }
+
     /// Forgets what is prepared.
     pub(crate) const fn forget(&mut self) {
         self.prepared = None;
@@ -141,6 +150,15 @@ impl PatchBuffer {
             self.second = !self.second;
             return Ok(());
         }
+        self.both().0.lay(job, route, piece)
+    }
+
+    /// Makes this piece current again, after [`Self::advance`].
+    ///
+    /// # Errors
+    /// Those of [`Patch::lay`].
+    pub(crate) fn go_back(&mut self, job: &Job<'_>, route: &Route, piece: &Piece) -> Result<()> {
+        self.restart_tasks();
         self.both().0.lay(job, route, piece)
     }
 

@@ -36,10 +36,11 @@ impl Patch {
     ///
     /// # Errors
     /// As [`Self::evaluate_on`].
-    pub(crate) fn evaluate_on_line(&self, fraction: u64) -> Result<Located> {
+    pub(crate) fn evaluate_on_line(&self, fraction: u64) -> Result<(Contact, Located)> {
         let contact = self.surface.contact_on_line(fraction, &self.ball)?;
         check_fit(&contact)?;
-        self.locator.locate(&contact, &self.origin)
+        let located = self.locator.locate(&contact, &self.origin)?;
+        Ok((contact, located))
     }
 
     /// Whether the surface faces up at a contact with this offset, so that the tool can retract upwards.

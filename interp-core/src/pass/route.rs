@@ -200,6 +200,11 @@ impl Piece {
         end
     }
 
+    /// Whether another piece of the same pass is this one.
+    pub(crate) fn is_same(&self, other: &Self) -> bool {
+        self.position.span == other.position.span && self.range == other.range
+    }
+
     /// Whether it is as long as the patch.
     pub(crate) const fn is_whole(&self) -> bool {
         matches!(self.range, [0, u64::MAX])

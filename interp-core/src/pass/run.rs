@@ -4,8 +4,10 @@
 //! |---|---|
 //! | [`travel`] | position and progress, and the sample there |
 //! | [`next_pass`] | what is planned for the next pass, and its begin |
+//! | [`ahead`] | the move of the next tick, made before it |
 //! | [`place`] | where the run is on its pass, for the feed |
 
+mod ahead;
 mod next_pass;
 mod place;
 mod travel;
@@ -21,6 +23,7 @@ use crate::pass::route::Route;
 use crate::pass::schedule;
 use crate::sample::{Sample, SpanParameter, interval_of};
 use crate::surface::{AnyCurve, AnyPass, PathSpeed};
+use ahead::Prepared;
 use next_pass::{BEGINS_ANYWHERE, PassPlanning};
 use travel::{Next, Travel};
 
@@ -52,6 +55,8 @@ pub(crate) struct Run {
     step_over: Option<f32>,
     /// That pass, once its first patch is collapsed.
     next_route: Option<Route>,
+    /// What is prepared of the next sample.
+    prepared: Prepared,
     /// Feed factor of the last step along the pass.
     last_feed_factor: f32,
     /// The passes of a region, and the next of them without axis limits; a fault of theirs is reported when the tool is there.
@@ -70,6 +75,7 @@ impl Run {
         last_interval: f32::INFINITY,
         step_over: None,
         next_route: None,
+        prepared: Prepared::Nothing,
         last_feed_factor: 0.0,
         lines: RegionLines::START,
         next_pass: NextPass::Sought,
@@ -92,6 +98,7 @@ impl Run {
         self.last_interval = f32::INFINITY;
         self.step_over = None;
         self.next_route = None;
+        self.prepared = Prepared::Nothing;
     }
 
     /// Minimum path interval of the last finished pass.
@@ -99,9 +106,18 @@ impl Run {
         self.last_interval
     }
 
+    /// The same as before a run, and as after one.
+    pub(crate) const fn forget_interval(&mut self) {
+        self.last_interval = f32::INFINITY;
+    }
+
+    pub(crate) const fn keep_interval(&mut self, interval: f32) {
+        self.last_interval = interval;
+    }
+
     /// Whether the next sample continues the pass.
-    pub(crate) fn is_along(&self) -> bool {
-        self.travel.next == Next::Along
+    pub(crate) const fn is_along(&self) -> bool {
+        matches!(self.travel.next, Next::Along)
     }
 
     /// Writes the next sample into `last`; false after the last sample.
@@ -110,8 +126,8 @@ impl Run {
     /// The fault that stops the run; `last` is unchanged.
     #[inline(always)]
     pub(crate) fn advance(&mut self, job: &Job<'_>, last: &mut Sample) -> Result<bool> {
-        let travel = &mut self.travel;
-        if travel.next == Next::Along {
+        let travel = &self.travel;
+        if travel.next == Next::Along && !self.is_ahead() {
             let step = contact::step(
                 &travel.path,
                 travel.log_speed_derivative_before,
@@ -134,7 +150,9 @@ impl Run {
     #[inline(never)]
     pub(crate) fn advance_far(&mut self, job: &Job<'_>, feed_factor: f32, last: &mut Sample) -> Result<bool> {
         let begins = !self.is_along();
+        let has_moved = !begins && self.has_moved(job, feed_factor)?;
         match self.travel.next {
+            Next::Along if has_moved => {}
             Next::Along if self.buffer.patch().point => self.step_on_pole(job)?,
             Next::Along => self.step_far(job, feed_factor)?,
             Next::Pass | Next::Over => match self.change_pass(job)? {
@@ -148,7 +166,11 @@ impl Run {
             Next::Begun => self.travel.next = Next::Along,
             Next::End => return Ok(false),
         }
-        self.sample(last)?;
+        if begins {
+            self.first_sample(last)?;
+        } else {
+            self.sample_seldom(last)?;
+        }
         let travel = &self.travel;
         if begins {
             self.first_offset = travel.offset;
@@ -185,6 +207,7 @@ impl Run {
     /// Collapses the first patch of a pass ahead of [`Self::enter_pass`], once the present pass needs no further patch.
     pub(crate) fn prepare_pass(&mut self, job: &Job<'_>, route: &Route) {
         self.buffer.prepare(job, route);
+        self.evaluate_first();
     }
 
     /// Emits the first sample of the pass that was entered; its minimum interval is known from the look-ahead.
@@ -192,7 +215,7 @@ impl Run {
     /// # Errors
     /// As [`Self::advance`].
     pub(crate) fn begin(&mut self, interval: f32, last: &mut Sample) -> Result<()> {
-        self.sample(last)?;
+        self.first_sample(last)?;
         self.first_offset = self.travel.offset;
         self.last_interval = interval;
         self.last_feed_factor = 0.0;
@@ -213,7 +236,7 @@ impl Run {
         self.enter_pass(job, pass, route)?;
         let ticks = self.travel.ticks;
         let mut start = Sample::START;
-        self.sample(&mut start)?;
+        self.first_sample(&mut start)?;
         self.travel.ticks = ticks;
         self.first_offset = self.travel.offset;
         self.last_interval = interval;
@@ -226,26 +249,36 @@ impl Run {
     /// # Errors
     /// As [`Self::advance`].
     pub(crate) fn move_by(&mut self, job: &Job<'_>, feed_factor: f32, last: &mut Sample) -> Result<()> {
-        let travel = &mut self.travel;
+        if !self.has_moved(job, feed_factor)? {
+            let before = self.derivative_before(job, feed_factor);
+            let step = contact::step(&self.travel.path, before, feed_factor * self.buffer.patch().arc);
+            if let Some(step) = step
+                && self.moves(job, step)?
+            {
+                self.last_feed_factor = feed_factor;
+                self.sample(last)?;
+                last.feed_mm_s = job.header.feed_mm_s * feed_factor;
+                return Ok(());
+            }
+            self.step_far(job, feed_factor)?;
+        }
+        self.last_feed_factor = feed_factor;
+        self.sample(last)?;
+        self.describe(job.header.feed_mm_s * feed_factor, last);
+        Ok(())
+    }
+
+    /// The logarithmic speed derivative one sample before, for a step by this part of a period's arc.
+    #[inline(always)]
+    fn derivative_before(&self, job: &Job<'_>, feed_factor: f32) -> f32 {
+        let travel = &self.travel;
+        if job.header.axes.is_none() {
+            return travel.log_speed_derivative_before;
+        }
         // The third-order term assumes equal steps: the change over the last step is scaled to this one.
         let change = (travel.path.log_speed_derivative - travel.log_speed_derivative_before)
             * (feed_factor / self.last_feed_factor);
-        let before = travel.path.log_speed_derivative - change;
-        self.last_feed_factor = feed_factor;
-        let step = contact::step(&travel.path, before, feed_factor * self.buffer.patch().arc);
-        if let Some(step) = step
-            && self.moves(job, step)?
-        {
-            self.sample(last)?;
-            last.feed_mm_s = job.header.feed_mm_s * feed_factor;
-            return Ok(());
-        }
-        let interval = self.last_interval;
-        self.step_far(job, feed_factor)?;
-        self.sample(last)?;
-        self.last_interval = interval;
-        self.describe(job.header.feed_mm_s * feed_factor, last);
-        Ok(())
+        travel.path.log_speed_derivative - change
     }
 
     /// Moves to the end of the pass, which differs from the position by rounding only.
@@ -253,6 +286,7 @@ impl Run {
     /// # Errors
     /// As [`Self::advance`]; [`FaultKind::PatchTooShort`] where a whole patch is still left.
     pub(crate) fn finish_pass(&mut self, job: &Job<'_>, last: &mut Sample) -> Result<()> {
+        self.take_back(job)?;
         if self.is_along() {
             let Self { travel, buffer, .. } = self;
             let is_last = buffer.next(job, &travel.route, &travel.piece).is_none();
@@ -260,7 +294,7 @@ impl Run {
                 return Err(Fault::new(FaultKind::PatchTooShort, 0.0));
             }
             self.end_pass(job);
-            self.sample(last)?;
+            self.sample_seldom(last)?;
             self.describe(0.0, last);
         } else {
             self.stand(last);
@@ -274,12 +308,13 @@ impl Run {
     /// As [`Self::advance`].
     #[cold]
     #[inline(never)]
-    pub(crate) fn show(&mut self, last: &mut Sample) -> Result<()> {
+    pub(crate) fn show(&mut self, job: &Job<'_>, last: &mut Sample) -> Result<()> {
+        self.take_back(job)?;
         let before = self.travel.log_speed_derivative_before;
         // The period is counted already.
         let ticks = self.travel.ticks;
         self.travel.ticks = last.tick;
-        self.sample(last)?;
+        self.sample_seldom(last)?;
         (self.travel.log_speed_derivative_before, self.travel.ticks) = (before, ticks);
         self.describe(0.0, last);
         Ok(())
@@ -328,6 +363,20 @@ impl Run {
         last.path.span = self.travel.span();
         last.side = self.travel.side;
         last.feed_mm_s = feed_mm_s;
+    }
+
+    /// The first sample of the pass that has begun.
+    fn first_sample(&mut self, last: &mut Sample) -> Result<()> {
+        match self.take_first() {
+            Some(first) => self.travel.first_sample(&first, self.buffer.patch(), last),
+            None => self.sample_seldom(last),
+        }
+    }
+
+    /// [`Self::sample`], of which each call is a copy, for ticks that are seldom.
+    #[inline(never)]
+    fn sample_seldom(&mut self, last: &mut Sample) -> Result<()> {
+        self.sample(last)
     }
 
     /// The sample at the run's position.
@@ -503,6 +552,9 @@ impl Run {
         let (piece, is_prepared) = self.buffer.first_piece(job, &route);
         travel.piece = piece;
         travel.fraction = travel.piece.start();
+        if !is_prepared {
+            self.prepared = Prepared::Nothing;
+        }
         // The maximum is that of all passes on the line.
         let goes_on = travel.pass > 0 && route.side == side_before;
         if !goes_on {

@@ -232,7 +232,11 @@ impl PassScan {
 
     /// Length of the patch, roughly, units; 0 where its surface is not evaluated.
     fn length(&self) -> f32 {
-        let at = |fraction| self.patch.evaluate_on_line(fraction).map(|located| located.cc_nm);
+        let at = |fraction| {
+            self.patch
+                .evaluate_on_line(fraction)
+                .map(|(_, located)| located.cc_nm)
+        };
         let [start, end] = self.piece.range;
         let middle = (start + (end.saturating_sub(start) >> 1)).saturating_add(1);
         let (Ok(start), Ok(middle), Ok(end)) = (at(start), at(middle), at(end)) else {

@@ -196,7 +196,7 @@ impl Sequencer {
             self.end_leg(leg);
             if self.phase == Phase::Pass {
                 // Back from a pause: the sample of the place at which the pass was left.
-                run.show(last)?;
+                run.show(job, last)?;
             }
         }
         Ok(())

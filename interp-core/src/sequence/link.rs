@@ -123,6 +123,13 @@ impl Progress {
         self.pace.is_at_rest()
     }
 
+    /// Where the next period ends, if nothing else is wanted until then.
+    fn next(&self, pace: f32, period: f32) -> CurveCursor {
+        let mut cursor = self.cursor;
+        self.curve.advance(&mut cursor, pace * period);
+        cursor
+    }
+
     /// Whether a change of the pace is sought.
     pub(crate) fn has_work(&self) -> bool {
         self.pace.has_work()
@@ -303,6 +310,8 @@ pub(crate) struct BoundaryStepOver {
     jump_beside: f32,
     /// The place before: the contact at the last station, the centre at a side of a knot.
     place: [i32; 3],
+    /// A share of the way that is located ahead of the tick that comes there.
+    ahead: Option<(f32, Located)>,
     /// Maximum ratio of the length of the contact's path to the length in the plan.
     contact_ratio: f32,
     /// Feed for which it was planned, mm/s.
@@ -338,6 +347,7 @@ impl BoundaryStepOver {
         jump: 0.0,
         jump_beside: 0.0,
         place: [0; 3],
+        ahead: None,
         contact_ratio: 1.0,
         feed: 1.0,
     };
@@ -379,6 +389,7 @@ impl BoundaryStepOver {
         self.bends = [[0.0; 3]; 3];
         (self.jump_at, self.jump, self.jump_beside) = (0.0, 0.0, 0.0);
         self.contact_ratio = 1.0;
+        self.ahead = None;
         self.feed = feed;
     }
 
@@ -429,7 +440,7 @@ impl BoundaryStepOver {
     fn locate(&mut self, job: &Job<'_>, part: f32) -> Result<Located> {
         let parameter = self.parameter(job, part);
         let at = self.move_to(job, parameter)?;
-        let (_, located) = self.patch.evaluate(at)?;
+        let (_, located) = self.patch.evaluate_on_line(at)?;
         Ok(located)
     }
 
@@ -537,7 +548,7 @@ impl BoundaryStepOver {
         let mut sides = [0.0; 2];
         for (of_side, parameter) in sides.iter_mut().zip([before, behind]) {
             let at = self.move_to(job, parameter)?;
-            let (contact, located) = self.patch.evaluate(at)?;
+            let (contact, located) = self.patch.evaluate_on_line(at)?;
             if parameter.span > span {
                 check_crease(job, axes, [&self.place, &located.cl_nm])?;
             }
@@ -633,15 +644,44 @@ impl BoundaryStepOver {
     /// # Errors
     /// The fault of the surface there.
     pub(crate) fn position(&mut self, job: &Job<'_>) -> Result<Located> {
+        let part = self.part_at(&self.progress.cursor);
+        match self.ahead.take() {
+            Some((at, located)) if at.to_bits() == part.to_bits() => Ok(located),
+            _ => self.locate(job, part),
+        }
+    }
+
+    /// The share of the way at a place of the curve.
+    fn part_at(&self, cursor: &CurveCursor) -> f32 {
         let Progress {
-            cursor, length_q10, ..
+            curve, length_q10, ..
         } = &self.progress;
-        let part = if self.progress.is_over() || cursor.moved_q10 >= *length_q10 {
+        if curve.is_over(cursor) || cursor.moved_q10 >= *length_q10 {
             1.0
         } else {
             to_f32(cursor.moved_q10) / to_f32(*length_q10)
-        };
-        self.locate(job, part)
+        }
+    }
+
+    /// Whether a place is located ahead.
+    pub(crate) const fn is_ahead(&self) -> bool {
+        self.ahead.is_some()
+    }
+
+    /// Locates where the next period ends. A fault is left for that.
+    pub(crate) fn locate_ahead(&mut self, job: &Job<'_>, profiles: &Profiles) {
+        let pace = self.progress.pace.next(profiles);
+        self.locate_next(job, pace);
+    }
+
+    /// The same of the first period, which begins at this pace.
+    pub(crate) fn locate_first(&mut self, job: &Job<'_>, pace: f32) {
+        self.locate_next(job, pace);
+    }
+
+    fn locate_next(&mut self, job: &Job<'_>, pace: f32) {
+        let part = self.part_at(&self.progress.next(pace, job.header.period_s));
+        self.ahead = self.locate(job, part).ok().map(|located| (part, located));
     }
 
     /// Feed for which it was planned, mm/s.

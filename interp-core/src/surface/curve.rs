@@ -3,8 +3,6 @@
 //! Nothing is collapsed: each coordinate is evaluated in rows across the path, then along it. With A and B the first derivatives, p and q those of g,
 //! the path's tangent is `T = A + p B`, and `T' = S_path,path + 2 p S_path,side + p^2 S_side,side + q B`.
 
-use core::sync::atomic::{Ordering, compiler_fence};
-
 use super::lines::{CoordinatePoint, point_by_rows};
 use super::pole::PoleAt;
 use super::range::Edges;
@@ -15,7 +13,7 @@ use super::{
     Ball, Contact, Derivatives, Factors, IsoLine, Local, Pass, PathSpeed, REVOLVED_WORDS, split_patch,
 };
 use crate::fault::Result;
-use crate::math::arith::{centred, inverse_sqrt};
+use crate::math::arith::{centred, computed, inverse_sqrt, to_f32};
 use crate::math::vec3::Vec3;
 
 /// The kind of a patch's record.
@@ -172,29 +170,29 @@ impl CurvePass {
         if matches!(self.kind, CurveKind::Profile | CurveKind::Circle) {
             return self.revolved(path, side, Some(ball));
         }
-        let point = self.grid(path, side);
+        let point = self.grid(path, side, &SidePoint::ON_LINE);
         let contact = point.local.contact::<true, true>(ball, &point.factors)?;
         Ok((contact, point.derivatives()))
     }
 
     /// A point of a grid's patch, for callers outside the sample path.
     #[inline(never)]
-    fn grid(&self, path: u64, side: u64) -> GridPoint {
+    fn grid(&self, path: u64, side: u64, point: &SidePoint) -> GridPoint {
         let w = centred(path);
         match self.kind {
-            CurveKind::Polynomial => self.polynomial(w, side),
-            CurveKind::Rational => self.rational(w, side),
-            _ => self.pole(w, side),
+            CurveKind::Polynomial => self.polynomial(w, side, point),
+            CurveKind::Rational => self.rational(w, side, point),
+            _ => self.pole(w, side, point),
         }
     }
 
     #[inline(always)]
-    fn polynomial(&self, w: i32, side: u64) -> GridPoint {
+    fn polynomial(&self, w: i32, side: u64, point: &SidePoint) -> GridPoint {
         let [x, y, z, _] = &self.blocks;
         let side = centred(side);
-        let axis = |block: &[i32; 16]| in_order(point_by_rows(block, side, w));
-        let ([x0, x1, x2, xs, xm, xx], [y0, y1, y2, ys, ym, yy], [z0, z1, z2, zs, zm, zz]) =
-            (axis(x), axis(y), axis(z));
+        let ([x0, x1, x2, xs, xm, xx], x) = point.polynomial_axis(x, side, w);
+        let ([y0, y1, y2, ys, ym, yy], y) = point.polynomial_axis(y, side, w);
+        let ([z0, z1, z2, zs, zm, zz], z) = point.polynomial_axis(z, side, w);
         GridPoint {
             local: Local {
                 position: [x0, y0, z0],
@@ -207,34 +205,53 @@ impl CurvePass {
                 inverse_g: 1.0,
                 excess: 0.0,
             },
+            half_change: Vec3 { x, y, z },
             factors: Factors::ONE,
             log_weight: [0.0; 2],
         }
     }
 
     #[inline(always)]
-    fn rational(&self, w: i32, side: u64) -> GridPoint {
+    fn rational(&self, w: i32, side: u64, point: &SidePoint) -> GridPoint {
         let [x, y, z, weight] = &self.blocks;
         let side = centred(side);
-        let weight = Weight::new(in_order(point_by_rows(weight, side, w)));
-        let axis = |block: &[i32; 16]| in_order(quotient(point_by_rows(block, side, w), &weight));
+        let (weight, _) = computed(point_by_rows(weight, side, w), 0.0);
+        let weight = Weight::new(weight);
+        // Not by a closure, which LLVM may not inline.
+        let (x, half_x) = point.rational_axis(x, side, w, &weight);
+        let (y, half_y) = point.rational_axis(y, side, w, &weight);
+        let (z, half_z) = point.rational_axis(z, side, w, &weight);
         GridPoint {
-            local: weight.local(axis(x), axis(y), axis(z)),
+            local: weight.local(x, y, z),
+            half_change: Vec3 {
+                x: half_x,
+                y: half_y,
+                z: half_z,
+            },
             factors: Factors::ONE,
             log_weight: weight.log_derivatives(),
         }
     }
 
     #[inline(always)]
-    fn pole(&self, w: i32, side: u64) -> GridPoint {
+    fn pole(&self, w: i32, side: u64, point: &SidePoint) -> GridPoint {
         let [x, y, z, weight] = &self.blocks;
         let line = iso_line(side);
         let weight = Weight::new(point_by_rows(weight, line.side, w));
         let pole = PoleAt::new(self.edges, &line);
-        let axis = |block: &[i32; 16]| pole.axis(block, &line, &weight, w);
+        let factors = pole.factors(w);
+        let axis = |block: &[i32; 16]| point.in_order(pole.axis(block, &line, &weight, w), &factors);
+        let (x, half_x) = axis(x);
+        let (y, half_y) = axis(y);
+        let (z, half_z) = axis(z);
         GridPoint {
-            local: weight.local(axis(x), axis(y), axis(z)),
-            factors: pole.factors(w),
+            local: weight.local(x, y, z),
+            half_change: Vec3 {
+                x: half_x,
+                y: half_y,
+                z: half_z,
+            },
+            factors,
             log_weight: weight.log_derivatives(),
         }
     }
@@ -267,7 +284,7 @@ impl CurvePass {
                 let found = self.revolved(path, side, None);
                 found.map(|(_, by)| by.speed(&point)).unwrap_or(PathSpeed::STILL)
             }
-            _ => self.grid(path, side).speed(&point),
+            _ => self.grid(path, side, &point).speed(&point),
         };
         self.turned(along)
     }
@@ -285,7 +302,7 @@ impl CurvePass {
                     .unwrap_or_default();
                 [by.path + by.side * point.slope, by.side]
             }
-            _ => self.grid(path, side).tangent(&point),
+            _ => self.grid(path, side, &point).tangent(&point),
         };
         (next.third() - self.curve.third()) * (tangent.dot(beside) / tangent.dot(tangent))
     }
@@ -349,7 +366,8 @@ impl Pass for PolynomialCurve<'_> {
     #[inline(always)]
     fn contact(&self, fraction: u64, ball: &Ball) -> Result<Contact> {
         let (w, side) = self.0.place(fraction);
-        self.0.contact(&self.0.pass.polynomial(w, side), ball)
+        self.0
+            .contact(&self.0.pass.polynomial(w, side, &self.0.point), ball)
     }
 }
 
@@ -359,7 +377,8 @@ impl Pass for RationalCurve<'_> {
     #[inline(always)]
     fn contact(&self, fraction: u64, ball: &Ball) -> Result<Contact> {
         let (w, side) = self.0.place(fraction);
-        self.0.contact(&self.0.pass.rational(w, side), ball)
+        self.0
+            .contact(&self.0.pass.rational(w, side, &self.0.point), ball)
     }
 }
 
@@ -369,7 +388,7 @@ impl Pass for PoleCurve<'_> {
     #[inline(never)]
     fn contact(&self, fraction: u64, ball: &Ball) -> Result<Contact> {
         let (w, side) = self.0.place(fraction);
-        self.0.contact(&self.0.pass.pole(w, side), ball)
+        self.0.contact(&self.0.pass.pole(w, side, &self.0.point), ball)
     }
 }
 
@@ -394,7 +413,7 @@ impl Pass for CurvePass {
         if matches!(self.kind, CurveKind::Profile | CurveKind::Circle) {
             return RevolvedCurve(OnCurve { pass: self, point }).contact(fraction, ball);
         }
-        let at = self.grid(self.own(fraction), self.own_side(&point));
+        let at = self.grid(self.own(fraction), self.own_side(&point), &point);
         OnCurve { pass: self, point }.contact(&at, ball)
     }
 }
@@ -402,6 +421,8 @@ impl Pass for CurvePass {
 /// A point of a grid's patch, evaluated in rows across the path, then along it.
 struct GridPoint {
     local: Local,
+    /// Half of T' in units of g, without the terms of the weight's change.
+    half_change: Vec3,
     factors: Factors,
     /// Relative change of the weight along the path and across it.
     log_weight: [f32; 2],
@@ -424,25 +445,14 @@ impl GridPoint {
     /// weight's change, which add up to its relative change along the curve times T.
     #[inline(always)]
     fn speed(&self, point: &SidePoint) -> PathSpeed {
-        let Local {
-            path2,
-            mixed,
-            side2,
-            g,
-            ..
-        } = self.local;
-        let Factors { path: a, side: b, .. } = self.factors;
         let [along, across] = self.log_weight;
-        let SidePoint { slope, half_bend, .. } = *point;
-        let [tangent, beside] = self.tangent(point);
-        let half = Vec3::of(path2) * a
-            + Vec3::of(mixed) * slope
-            + Vec3::of(side2) * (slope * slope * b)
-            + beside * half_bend;
+        let SidePoint { slope, .. } = *point;
+        let [tangent, _] = self.tangent(point);
         let inverse = inverse_sqrt(tangent.dot(tangent));
+        let change = tangent.dot(self.half_change) * (inverse * inverse);
         PathSpeed {
-            inv_speed: inverse * g,
-            log_speed_derivative: 2.0 * (tangent.dot(half) * (inverse * inverse) - (along + across * slope)),
+            inv_speed: inverse * self.local.g,
+            log_speed_derivative: 2.0 * (change - (along + across * slope)),
         }
     }
 }
@@ -472,9 +482,29 @@ const fn iso_line(side: u64) -> IsoLine {
     }
 }
 
-/// A coordinate, complete before the next is begun: given the freedom, LLVM evaluates all of them at once and spills what lives from row to row.
-#[inline(always)]
-fn in_order(point: CoordinatePoint) -> CoordinatePoint {
-    compiler_fence(Ordering::SeqCst);
-    point
+impl SidePoint {
+    /// A coordinate of a polynomial patch; see [`Self::in_order`].
+    #[inline(always)]
+    fn polynomial_axis(&self, block: &[i32; 16], side: i32, w: i32) -> (CoordinatePoint, f32) {
+        self.in_order(point_by_rows(block, side, w), &Factors::ONE)
+    }
+
+    /// The same of a rational one.
+    #[inline(always)]
+    fn rational_axis(&self, block: &[i32; 16], side: i32, w: i32, weight: &Weight) -> (CoordinatePoint, f32) {
+        let (numerator, _) = computed(point_by_rows(block, side, w), 0.0);
+        self.in_order(quotient(numerator, weight), &Factors::ONE)
+    }
+
+    /// A coordinate of a point, and of half of T' without the terms of the weight's change, both complete before the next is begun.
+    #[inline(always)]
+    fn in_order(&self, point: CoordinatePoint, factors: &Factors) -> (CoordinatePoint, f32) {
+        let Factors { path: a, side: b, .. } = *factors;
+        let [_, _, path2, side, mixed, side2] = point;
+        let half_change = to_f32(path2) * a
+            + to_f32(mixed) * self.slope
+            + to_f32(side2) * (self.slope * self.slope * b)
+            + to_f32(side) * b * self.half_bend;
+        computed(point, half_change)
+    }
 }

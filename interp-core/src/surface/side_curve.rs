@@ -33,6 +33,15 @@ pub(crate) struct SidePoint {
     pub(super) half_bend: f32,
 }
 
+impl SidePoint {
+    /// On a line of constant side parameter.
+    pub(super) const ON_LINE: Self = Self {
+        side: 0,
+        slope: 0.0,
+        half_bend: 0.0,
+    };
+}
+
 impl SideCurve {
     pub(super) const NONE: Self = Self {
         bits: 0,

@@ -406,11 +406,6 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "bisections of a place: BISECTIONS; extrema of a cubic",
     ),
     (
-        "interp_core::sequence::link::BoundaryStepOver::look_at_knot",
-        2,
-        "sides of a knot",
-    ),
-    (
         "interp_core::sequence::lookahead::stations::store_start",
         168,
         "stations of a pass: STATIONS",
@@ -441,14 +436,9 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "rows of a block; coordinates",
     ),
     (
-        "interp_core::sequence::sequencer::planning::next_cycles",
-        2,
-        "ends of a plan that are compared",
-    ),
-    (
-        "interp_core::sequence::sequencer::planning::next_own_cycles",
-        2,
-        "ends of a plan that are compared",
+        "interp_core::sequence::sequencer::planning::plan_ahead",
+        36,
+        "pieces of the planning of a period: PIECES_MAX",
     ),
     ("interp_core::feed::newton::rows::Place::rows", 3, "axes"),
     ("interp_core::feed::plan::motion::MotionAt::each_axis", 3, "axes"),

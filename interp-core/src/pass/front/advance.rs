@@ -288,7 +288,8 @@ impl Advance {
             | Task::Point
             | Task::FillForwards
             | Task::FillBackwards => cost::COPY,
-            Task::Forwards | Task::Backwards | Task::Compare | Task::Lower | Task::Eliminate => cost::SWEEP,
+            Task::Forwards | Task::Backwards | Task::Lower | Task::Eliminate => cost::SWEEP,
+            Task::Compare => cost::COMPARE,
             Task::Hull => cost::HULL,
             Task::Substitute => cost::SUBSTITUTE,
         }

@@ -11,6 +11,7 @@ pub(crate) const CREST: [u32; 3] = [5_100, 6_300, 7_200];
 /// Rows of the sweeps, a chunk.
 pub(crate) const COPY: u32 = 4_300;
 pub(crate) const SWEEP: u32 = 7_400;
+pub(crate) const COMPARE: u32 = 15_200;
 pub(crate) const HULL: u32 = 8_400;
 pub(crate) const SUBSTITUTE: u32 = 10_400;
 

@@ -1,7 +1,8 @@
 //! From pass to pass: what is planned for the next one while the tool is on this one, and its begin.
 
 use super::Run;
-use super::travel::{Next, Travel};
+use super::ahead::Prepared;
+use super::travel::{FirstSample, Next, Travel};
 use crate::fault::Result;
 use crate::job::program::Job;
 use crate::job::stream::RowsNeeded;
@@ -118,7 +119,7 @@ impl Run {
 
     /// Whether [`Self::plan`] has anything to do.
     pub(crate) fn has_to_plan(&self, spacing: Spacing) -> bool {
-        self.has_to_prepare() || self.has_to_plan_pass(spacing)
+        self.has_to_prepare() || self.has_to_plan_pass(spacing) || self.may_move_ahead()
     }
 
     fn has_to_plan_pass(&self, spacing: Spacing) -> bool {
@@ -188,7 +189,7 @@ impl Run {
         }
         match self.next_pass(job) {
             Ok(NextRoute::Pass(route)) => {
-                self.buffer.prepare(job, &route);
+                self.prepare_pass(job, &route);
                 self.next_route = Some(route);
             }
             Ok(NextRoute::NotYet | NextRoute::None) => {}
@@ -203,7 +204,7 @@ impl Run {
             && let Ok(side) = self.side_after(job, step)
         {
             let route = Route::of_pass(job.header, self.travel.pass.wrapping_add(1), side);
-            self.buffer.prepare(job, &route);
+            self.prepare_pass(job, &route);
             self.next_route = Some(route);
         }
     }
@@ -365,6 +366,14 @@ impl Run {
         self.travel.route.side.span
     }
 
+    /// The first pass, where it is not known from [`Self::prepare_start`].
+    pub(crate) fn take_first_route(&mut self, job: &Job<'_>) -> Route {
+        match self.next_route.take() {
+            Some(route) => route,
+            None => self.first_route(job),
+        }
+    }
+
     /// The first pass.
     pub(crate) fn first_route(&mut self, job: &Job<'_>) -> Route {
         if let PassPlanning::Fronts(fronts) = &mut self.planning {
@@ -374,17 +383,23 @@ impl Run {
         of_region.unwrap_or_else(|| Route::of_pass(job.header, 0, SpanParameter::default()))
     }
 
-    /// A job was loaded: begins its first pass, ahead of the tick that starts the run. Returns whether that is done; a fault is left for that tick, and so is
-    /// all of it for a region and a streamed job, whose rows may not be here yet. With limits the first pass is planned, and prepared on the way to it.
+    /// Begins the first pass, ahead of the tick that starts the run. Returns whether that is done; a fault is left for that tick, and so is
+    /// all of it for a streamed job, whose rows may not be here yet. With limits the first pass is planned, and prepared on the way to it.
     pub(crate) fn prepare_start(&mut self, job: &Job<'_>) -> bool {
         self.buffer.forget();
-        if self.lines.is_in_use() || job.header.window > 0 || job.header.axes.is_some() {
+        if job.header.window > 0 {
             return false;
         }
         let route = self.first_route(job);
+        if job.header.axes.is_some() {
+            self.next_route = Some(route);
+            return true;
+        }
         let is_begun = self.begin_pass(job, route).is_ok();
         if is_begun {
             self.travel.next = Next::Begun;
+            let first = FirstSample::of(self.buffer.patch(), &self.travel.piece);
+            self.prepared = first.map_or(Prepared::Nothing, Prepared::First);
         }
         is_begun
     }

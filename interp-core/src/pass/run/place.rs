@@ -8,9 +8,10 @@ impl Run {
     /// Pass, path and side parameter of the tool, in the surface's own direction.
     pub(crate) const fn surface_position(&self) -> (u32, SpanParameter, SpanParameter) {
         let travel = &self.travel;
+        let (piece, fraction) = self.here();
         let path = SpanParameter {
-            span: travel.span(),
-            fraction: travel.own_fraction(),
+            span: piece.position.span,
+            fraction: travel.route.turned(fraction),
         };
         (travel.pass, path, travel.side)
     }

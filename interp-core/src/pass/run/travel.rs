@@ -2,10 +2,11 @@
 
 use crate::fault::{Fault, FaultKind, Result};
 use crate::math::arith::{advanced, dot_hi};
+use crate::pass::offset::Located;
 use crate::pass::patch::Patch;
 use crate::pass::route::{Piece, Route};
 use crate::sample::{Sample, SpanParameter};
-use crate::surface::{Pass, PathSpeed};
+use crate::surface::{Contact, Pass, PathSpeed};
 
 /// The task of the next tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -89,25 +90,86 @@ impl Travel {
     /// each kind of surface saves only the registers that the kind uses.
     #[inline(never)]
     pub(super) fn sample<P: Pass>(&mut self, pass: &P, patch: &Patch, last: &mut Sample) -> Result<()> {
-        let (contact, located) = patch.evaluate_on(pass, self.fraction)?;
-        if patch.locator.folds(dot_hi(&self.offset, &contact.offset)) {
+        let evaluated = patch.evaluate_on(pass, self.fraction)?;
+        self.emit(&Evaluated::of(patch, &evaluated), patch, last)
+    }
+
+    /// The sample of what was evaluated at the run's position. A fault leaves `last` unchanged.
+    #[inline(always)]
+    fn emit(&mut self, at: &Evaluated, patch: &Patch, last: &mut Sample) -> Result<()> {
+        if patch.locator.folds(dot_hi(&self.offset, &at.offset)) {
             return Err(folded());
         }
-        let inv_interval_sq = patch.interval.inv_interval_sq(&contact);
-        if inv_interval_sq > self.max_inv_interval_sq {
-            self.max_inv_interval_sq = inv_interval_sq;
-            self.shape = [contact.across, contact.lateral_squared];
+        if at.inv_interval_sq > self.max_inv_interval_sq {
+            self.max_inv_interval_sq = at.inv_interval_sq;
+            self.shape = at.shape;
         }
-        self.offset = contact.offset;
+        self.offset = at.offset;
         self.log_speed_derivative_before = self.path.log_speed_derivative;
-        self.path = contact.path;
+        self.path = at.path;
         last.tick = self.ticks;
         last.path.fraction = self.own_fraction();
-        last.cc_nm = located.cc_nm;
-        last.cl_nm = located.cl_nm;
-        last.inv_interval_sq = inv_interval_sq;
+        last.cc_nm = at.located.cc_nm;
+        last.cl_nm = at.located.cl_nm;
+        last.inv_interval_sq = at.inv_interval_sq;
         self.ticks = self.ticks.wrapping_add(1);
         Ok(())
+    }
+
+    /// The first sample of a pass, evaluated ahead; see [`Self::sample`].
+    #[inline(never)]
+    pub(super) fn first_sample(
+        &mut self,
+        first: &FirstSample,
+        patch: &Patch,
+        last: &mut Sample,
+    ) -> Result<()> {
+        self.emit(&first.at, patch, last)?;
+        self.side = first.side;
+        last.side = first.side;
+        Ok(())
+    }
+}
+
+/// What is computed of a sample.
+#[derive(Clone, Copy, Debug)]
+struct Evaluated {
+    path: PathSpeed,
+    offset: [i32; 3],
+    located: Located,
+    inv_interval_sq: f32,
+    /// See [`Travel::shape`].
+    shape: [f32; 2],
+}
+
+impl Evaluated {
+    #[inline(always)]
+    fn of(patch: &Patch, (contact, located): &(Contact, Located)) -> Self {
+        Self {
+            path: contact.path,
+            offset: contact.offset,
+            located: *located,
+            inv_interval_sq: patch.interval.inv_interval_sq(contact),
+            shape: [contact.across, contact.lateral_squared],
+        }
+    }
+}
+
+/// The first sample of a pass, evaluated in the planning before the tick that emits it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct FirstSample {
+    at: Evaluated,
+    side: SpanParameter,
+}
+
+impl FirstSample {
+    /// At the start of a piece of a pass on its patch; none where that faults.
+    pub(super) fn of(patch: &Patch, piece: &Piece) -> Option<Self> {
+        let evaluated = patch.evaluate(piece.start()).ok()?;
+        Some(Self {
+            at: Evaluated::of(patch, &evaluated),
+            side: patch.side_at(&piece.position, piece.start()),
+        })
     }
 }
 

@@ -88,7 +88,11 @@ impl Lookahead {
 
     /// Length of the patch, roughly, mm; 0 where its surface is not evaluated.
     fn patch_length(&self) -> f32 {
-        let at = |fraction| self.patch.evaluate_on_line(fraction).map(|located| located.cc_nm);
+        let at = |fraction| {
+            self.patch
+                .evaluate_on_line(fraction)
+                .map(|(_, located)| located.cc_nm)
+        };
         let [start, end] = self.piece.range;
         let middle = start + end.saturating_sub(start).div_ceil(2);
         let (Ok(start), Ok(middle), Ok(end)) = (at(start), at(middle), at(end)) else {

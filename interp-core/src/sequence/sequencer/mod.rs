@@ -3,6 +3,7 @@
 //! [`Sequencer::tick`] moves the tool by one period. [`Sequencer::plan`] plans, a fixed portion a period: a change of the pace, the link to the next
 //! pass, the next pass. A pass is slowed down where the pass after it would not be planned in time.
 
+mod next_step;
 mod on_pass;
 mod planning;
 
@@ -26,6 +27,7 @@ use crate::sequence::legs::{Goal, Leg, LegPlanning};
 use crate::sequence::link::{BoundaryStepOver, StraightMove, check_faces_up};
 use crate::sequence::lookahead::{Lookahead, PassPlan};
 use crate::sequence::pause::Return;
+use next_step::NextStep;
 
 /// Least distance of a place within a pass from its ends, 0.5 mm, units of 2^-10 nm: the rest of the pass has cells of its own.
 const WITHIN_Q10: i64 = 500_000 << 10;
@@ -136,6 +138,8 @@ pub(crate) struct Sequencer {
     wait_pace: f32,
     /// Feed factor of the last period.
     feed_factor: f32,
+    /// The tool may have to wait on the surface at the end of the pass that is planned.
+    ends_on_surface: bool,
     /// The tool's position, once it is known.
     pub(super) at: Option<[i32; 3]>,
     /// Whether the first patch of the pass ahead is to be collapsed.
@@ -144,6 +148,9 @@ pub(crate) struct Sequencer {
     cell: [u16; 2],
     /// How far the tool is ahead of the progress, units of 2^-10 nm, where that was measured in the last period.
     correction: Option<i64>,
+    /// Whether the progress is corrected since the last tick on the pass, and the step of the next one.
+    is_corrected: bool,
+    next_step: Option<NextStep>,
     /// Whether the rows of patches are there that the planning of the pass after the next needs.
     has_rows: bool,
     /// Where a pause leads back to.
@@ -190,10 +197,13 @@ impl Sequencer {
         passed: 0.0,
         wait_pace: f32::MAX,
         feed_factor: 1.0,
+        ends_on_surface: false,
         at: None,
         has_first_patch: false,
         cell: [0; 2],
         correction: None,
+        is_corrected: false,
+        next_step: None,
         has_rows: false,
         back: Return::NONE,
         wanted: RunStart::FIRST,
@@ -242,6 +252,7 @@ impl Sequencer {
             pass.tail = Turn::NONE;
         }
         self.lookahead.restart();
+        self.forget_step();
         self.feed_factor = 1.0;
         (self.front_spent, self.front_last) = (0, 0);
         self.spent_last = 0;
@@ -488,7 +499,9 @@ impl Sequencer {
             Phase::Hop | Phase::Leg(_) | Phase::AwaitGoal(_) => {
                 Some(next).filter(|_| self.goal == Goal::Pass && is_located)
             }
-            Phase::Await | Phase::Pass | Phase::Lifted | Phase::Done => None,
+            // A step-over of no length ends in the tick that begins it.
+            Phase::Await => Some(next).filter(|_| self.is_planned()),
+            Phase::Pass | Phase::Lifted | Phase::Done => None,
         }
     }
 

@@ -50,6 +50,7 @@ impl Sequencer {
     pub(in crate::sequence) fn start_pass(&mut self, job: &Job<'_>) {
         self.has_first_patch = true;
         self.passed = 0.0;
+        self.forget_step();
         let (now, _) = both(&mut self.plans, self.second);
         self.cell = [0; 2];
         self.correction = None;
@@ -74,7 +75,7 @@ impl Sequencer {
         command: FeedCommand,
         last: &mut Sample,
     ) -> Result<()> {
-        self.correct_progress(run);
+        self.correct_once(run);
         let (now, _) = both(&mut self.plans, self.second);
         let is_over = if now.is_tip {
             run.stand(last);
@@ -99,12 +100,8 @@ impl Sequencer {
             }
             let pace = self.pace.tick(&mut self.profiles);
             self.passed += pace;
+            let moved = self.step_along_plan(pace);
             let (now, _) = both(&mut self.plans, self.second);
-            let moved = if pace > 0.0 {
-                self.follower.tick(&now.plan, pace)
-            } else {
-                0.0
-            };
             if self.follower.is_over(&now.plan) && !now.turns() {
                 check_end(&now.plan, &self.follower)?;
                 run.finish_pass(job, last)?;
@@ -196,7 +193,7 @@ impl Sequencer {
 
     /// Corrects the progress at each station by the plan's arc, so that errors do not accumulate from station to station: in the period after it was
     /// measured.
-    fn correct_progress(&mut self, run: &Run) {
+    pub(super) fn correct_progress(&mut self, run: &Run) {
         let (now, _) = both(&mut self.plans, self.second);
         if self.phase != Phase::Pass || now.point {
             return;
@@ -251,7 +248,7 @@ const END_MAX_MM: f32 = 1e-3;
 const END_MAX_SHARE: f32 = 0.25;
 
 /// Least move of a period, mm: a millionth of a nanometre is rounding.
-const MOVED_MIN: f32 = 1e-12;
+pub(super) const MOVED_MIN: f32 = 1e-12;
 
 /// The end of a plan is the end of its path: a step to there is none that an axis would notice.
 ///

@@ -34,6 +34,9 @@ const STEP_OVER_CYCLES: u32 = 6_000;
 const HOP_PACE_CYCLES: u32 = 3_300;
 const HOP_CYCLES: u32 = 24_000;
 
+/// Cycles of the first sample of a pass that is prepared.
+const FIRST_SAMPLE: u32 = 2_000;
+
 /// Cycles of the begin of a look-ahead, and of the planning of a leg.
 const BEGIN_CYCLES: u32 = 1_500;
 const LEG_CYCLES: u32 = 5_000;
@@ -74,6 +77,7 @@ impl Sequencer {
         };
         let wants_more = matches!(self.phase, Phase::Pass | Phase::Turn) && self.feed_factor > 1.0;
         is_busy
+            || self.has_step_to_prepare()
             || run.has_to_prepare()
             || wants_more
             || self.pass_ahead().is_some()
@@ -96,13 +100,29 @@ impl Sequencer {
             && matches!(self.planning, Planning::Feed | Planning::Complete)
     }
 
-    /// The planning of one period: work of at most [`PORTION_CYCLES`] cycles.
+    /// The planning of one period: what the next tick needs, and work of at most [`PORTION_CYCLES`] cycles with it.
     #[inline(never)]
     pub(crate) fn plan(&mut self, program: &Program, store: &mut [i32], run: &mut Run) {
         let Some(axes) = &program.header().axes else {
             return;
         };
         let spent = program.job(store).map_or(0, |job| run.prepare_piece(&job));
+        self.plan_ahead((program, axes), store, run, spent);
+        // Last, because a change of the pace that was found may begin with the next tick.
+        if let Ok(job) = program.job(store) {
+            self.prepare_step(&job, run);
+        }
+    }
+
+    /// Work of a period in which some cycles are spent already.
+    #[inline(always)]
+    fn plan_ahead(
+        &mut self,
+        (program, axes): (&Program, &AxisLimits),
+        store: &mut [i32],
+        run: &mut Run,
+        spent: u32,
+    ) {
         let mut left = PORTION_CYCLES - spent.min(PORTION_CYCLES);
         if matches!(self.phase, Phase::Pass | Phase::Turn) && self.feed_factor > 1.0 {
             let most = program
@@ -129,8 +149,14 @@ impl Sequencer {
             Planning::Awaited(_) | Planning::AwaitsRows(_) => {}
         }
         let mut makes_front = false;
+        // Nothing else becomes due between two pieces of the same stage of a pass's planning.
+        let mut goes_on = false;
         for piece in 0..PIECES_MAX {
-            let (is_front, cycles) = self.next_cycles(run);
+            let (is_front, cycles) = if goes_on {
+                (false, self.cycles_of_pass(run))
+            } else {
+                self.next_cycles(run)
+            };
             if cycles == 0 || (cycles > left && piece > 0) {
                 break;
             }
@@ -143,7 +169,13 @@ impl Sequencer {
             }
             left = left.saturating_sub(cycles);
             if let Ok(job) = program.job(store) {
-                self.work(&job, axes, run);
+                let stage = self.planning;
+                if goes_on {
+                    self.work_on_pass(&job, axes, run);
+                } else {
+                    goes_on = self.work(&job, axes, run);
+                }
+                goes_on &= stage == self.planning && self.pending.is_none();
             }
         }
         self.front_spent = self.front_spent.saturating_add(u32::from(makes_front));
@@ -215,12 +247,14 @@ impl Sequencer {
 
     /// Cycles of the next piece apart from the next front; none where there is none, or the next front comes first.
     fn next_own_cycles(&self, run: &Run) -> Option<u32> {
-        let (_, next) = self.plans_ref();
         match self.phase {
-            Phase::Pass | Phase::Turn if self.pace.has_work() && self.pace.begins_search() => {
-                return Some(PACE_BEGIN_CYCLES);
+            Phase::Pass | Phase::Turn if self.pace.has_work() => {
+                return Some(if self.pace.begins_search() {
+                    PACE_BEGIN_CYCLES
+                } else {
+                    PACE_CYCLES
+                });
             }
-            Phase::Pass | Phase::Turn if self.pace.has_work() => return Some(PACE_CYCLES),
             Phase::StepOver if self.step_over.progress.has_work() => return Some(LINK_PACE_CYCLES),
             Phase::Leg(_) if self.straight.progress.has_work() => return Some(LINK_PACE_CYCLES),
             Phase::Hop if self.hop.has_work() => return Some(HOP_PACE_CYCLES),
@@ -228,7 +262,7 @@ impl Sequencer {
             _ => {}
         }
         if self.pass_ahead().is_some() {
-            return Some(PATCH);
+            return Some(PATCH + FIRST_SAMPLE);
         }
         if self.pending.is_some() {
             return Some(0);
@@ -239,23 +273,43 @@ impl Sequencer {
         if self.has_to_plan_step_over() {
             return Some(STEP_OVER_CYCLES);
         }
-        Some(match self.planning {
-            Planning::Awaited(_) => return None,
-            Planning::Requested(..) => BEGIN_CYCLES,
-            Planning::AwaitsRows(_) => 0,
-            Planning::Stations => self.lookahead.cycles(run.estimator_ref()),
-            Planning::Feed => self.planner.cycles(&next.plan),
-            Planning::Complete if self.has_hop => HOP_CYCLES,
-            Planning::Complete => return None,
-        })
+        match self.planning {
+            Planning::Awaited(_) => None,
+            Planning::Complete if !self.has_hop => None,
+            _ => Some(self.cycles_of_pass(run)),
+        }
     }
 
+    /// Cycles of the next piece of the planning of the next pass.
+    fn cycles_of_pass(&self, run: &Run) -> u32 {
+        let (_, next) = self.plans_ref();
+        match self.planning {
+            Planning::Requested(..) => BEGIN_CYCLES,
+            Planning::AwaitsRows(_) | Planning::Awaited(_) => 0,
+            Planning::Stations => self.lookahead.cycles(run.estimator_ref()),
+            Planning::Feed => self.planner.cycles(&next.plan),
+            Planning::Complete => HOP_CYCLES,
+        }
+    }
+
+    /// Executes the next piece apart from the next front. Returns whether it was one of the stations or of the feed of the next pass.
+    #[inline(always)]
+    fn work(&mut self, job: &Job<'_>, axes: &AxisLimits, run: &mut Run) -> bool {
+        if self.work_beside(job, axes, run) {
+            return false;
+        }
+        self.work_on_pass(job, axes, run);
+        matches!(self.planning, Planning::Stations | Planning::Feed)
+    }
+
+    /// Executes a piece that comes before the planning of the next pass, if there is one.
     #[inline(never)]
-    pub(super) fn work(&mut self, job: &Job<'_>, axes: &AxisLimits, run: &mut Run) {
+    fn work_beside(&mut self, job: &Job<'_>, axes: &AxisLimits, run: &mut Run) -> bool {
         if let Phase::AwaitGoal(leg) = self.phase
             && self.has_to_plan_leg(leg)
         {
-            return self.plan_leg(leg, job, axes);
+            self.plan_leg(leg, job, axes);
+            return true;
         }
         let is_known = self.knows_next();
         let (now, next) = both(&mut self.plans, self.second);
@@ -264,23 +318,31 @@ impl Sequencer {
                 let known = is_known.then_some(&next.plan);
                 let stops = self.pace.wanted() == 0.0;
                 let road = road(&now.plan, known, next.plan.pace_max, stops);
-                return self.pace.work(&road, &self.follower.cursor, &mut self.profiles);
+                self.pace.work(&road, &self.follower.cursor, &mut self.profiles);
+                return true;
             }
             Phase::StepOver if self.step_over.progress.has_work() => {
-                return self.step_over.progress.work(&mut self.profiles);
+                self.step_over.progress.work(&mut self.profiles);
+                return true;
             }
             Phase::Leg(_) if self.straight.progress.has_work() => {
-                return self.straight.progress.work(&mut self.profiles);
+                self.straight.progress.work(&mut self.profiles);
+                return true;
             }
-            Phase::Hop if self.hop.has_work() => return self.hop.work(&mut self.profiles),
+            Phase::Hop if self.hop.has_work() => {
+                self.hop.work(&mut self.profiles);
+                return true;
+            }
             _ => {}
         }
         if let Some(route) = self.pass_ahead().map(|pass| pass.route) {
             self.has_first_patch = false;
-            return run.prepare_pass(job, &route);
+            run.prepare_pass(job, &route);
+            return true;
         }
         if self.may_choose() {
-            return self.choose_link(job);
+            self.choose_link(job);
+            return true;
         }
         let (now, next) = both(&mut self.plans, self.second);
         if self.has_step_over && self.step_over.is_requested() {
@@ -297,12 +359,19 @@ impl Sequencer {
                 let way = (now.end_boundary(job), now.route.reversed);
                 self.step_over.begin(job, axes, way, [now.end(), start], feed);
             }
-            return;
+            return true;
         }
         if self.has_step_over && !self.step_over.is_planned() {
             self.pending = self.step_over.work(job, axes).err();
-            return;
+            return true;
         }
+        false
+    }
+
+    /// Executes a piece of the planning of the next pass.
+    #[inline(never)]
+    fn work_on_pass(&mut self, job: &Job<'_>, axes: &AxisLimits, run: &mut Run) {
+        let (now, next) = both(&mut self.plans, self.second);
         match self.planning {
             Planning::Awaited(pass) => match run.next_pass(job) {
                 Ok(NextRoute::Pass(route)) => {
@@ -352,6 +421,7 @@ impl Sequencer {
                     } else {
                         let feed = job.header.feed_mm_s * self.feed_factor.at_least(1.0);
                         next.set_limits(job, MotionLimits::new(axes, feed, job.header.period_s));
+                        self.ends_on_surface = ends_on_surface(job, axes, next);
                         self.planner.begin(&mut next.plan);
                         Planning::Feed
                     };
@@ -360,17 +430,7 @@ impl Sequencer {
             Planning::Feed => {
                 // The pass after it takes as long to plan; off the surface it can be waited for.
                 let is_last = next.is_last && !self.planner.is_walking();
-                let is_on_surface = if job.header.spacing.is_constant() && job.header.edges == 0 {
-                    job.header.pattern == Pattern::Zigzag
-                } else if job.header.spacing.is_constant() {
-                    // The next pass may be joined along a boundary; what reaches one says so.
-                    let [_, at_boundary] = next.route.reach_boundaries(job);
-                    let is_joined = job.header.pattern == Pattern::Zigzag && at_boundary;
-                    is_joined || job.link_to(next.pass.wrapping_add(1), axes).is_low()
-                } else {
-                    next.steps_over || job.link_to(next.pass.wrapping_add(1), axes).is_low()
-                };
-                let least = if !is_last && is_on_surface {
+                let least = if !is_last && self.ends_on_surface {
                     let front = if run.needs_front() {
                         front_periods(self.front_spent, self.front_last)
                     } else {
@@ -452,6 +512,7 @@ impl Sequencer {
         let feed = job.header.feed_mm_s * self.feed_factor;
         let (_, next) = both(&mut self.plans, self.second);
         next.set_limits(job, MotionLimits::new(axes, feed, job.header.period_s));
+        self.ends_on_surface = ends_on_surface(job, axes, next);
         self.planner.begin(&mut next.plan);
         self.planning = Planning::Feed;
     }
@@ -477,6 +538,20 @@ impl Sequencer {
         } else {
             self.has_hop = true;
         }
+    }
+}
+
+/// Whether the tool may have to wait on the surface at the end of a pass, for the one after it.
+fn ends_on_surface(job: &Job<'_>, axes: &AxisLimits, pass: &PassPlan) -> bool {
+    let is_low = || job.link_to(pass.pass.wrapping_add(1), axes).is_low();
+    if job.header.spacing.is_constant() && job.header.edges == 0 {
+        job.header.pattern == Pattern::Zigzag
+    } else if job.header.spacing.is_constant() {
+        // The next pass may be joined along a boundary; what reaches one says so.
+        let [_, at_boundary] = pass.route.reach_boundaries(job);
+        (job.header.pattern == Pattern::Zigzag && at_boundary) || is_low()
+    } else {
+        pass.steps_over || is_low()
     }
 }
 
