@@ -13,11 +13,12 @@ use cycle_plugin::account::Account;
 use cycle_plugin::decode::{Branch, Class, decode};
 use cycle_plugin::plan::{Plan, Stage};
 use cycle_plugin::record::{RECORD_BYTES, Record};
+use cycles::search::genes::JobClass;
 use cycles::search::search;
 use cycles::session::MeasurementSession;
 use cycles::{
-    PERIOD_CYCLES, PLANNING_CYCLES_MAX, SURFACES, figures, figures::Figure, golden, graph, image, operations,
-    operations::Operations,
+    PERIOD_CYCLES, PLANNING_CYCLES_MAX, SURFACES, TICK_SHARE_MAX_PCT, figures, figures::Figure, golden,
+    graph, image, operations, operations::Operations,
 };
 use machine::prepare::prepare;
 use machine::remote::qemu::{self, Qemu};
@@ -484,6 +485,10 @@ fn no_stage_has_grown() {
         for figure in all.iter().filter(|figure| figure.stage == "pulses") {
             assert!(figure.max < PERIOD_CYCLES / 10, "{figure:?}");
         }
+        let ticks = all.iter().filter(|figure| figure.stage == figures::TICK);
+        for figure in ticks.filter(|figure| figure.surface.starts_with("constant height")) {
+            assert!(figure.period_share_pct() <= TICK_SHARE_MAX_PCT, "{figure:?}");
+        }
         let planning = all.iter().filter(|figure| figure.stage == figures::PLANNING);
         let planned: Vec<_> = planning
             .inspect(|figure| assert!(figure.max <= PLANNING_CYCLES_MAX, "{figure:?}"))
@@ -494,17 +499,17 @@ fn no_stage_has_grown() {
     });
 }
 
-/// The same for the worst-case tick that a search has found.
+/// The same for the worst-case ticks that searches have found.
 #[test]
-fn the_worst_tick_has_not_grown() {
-    check_growth(|_| (golden::worst_tick(images::setup()).unwrap(), Vec::new()));
+fn the_worst_ticks_have_not_grown() {
+    check_growth(|_| (golden::worst_ticks(images::setup()).unwrap(), Vec::new()));
 }
 
 /// A short search finds no tick above a tenth of the period, which is half of the firmware's tick budget (`TICK_BUDGET_CYCLES`, a fifth). The
 /// stack used is within the bound derived from the image.
-fn check_search(jobs: u32, limits: bool) {
+fn check_search(jobs: u32, class: JobClass) {
     let mut session = MeasurementSession::new(images::setup()).unwrap();
-    let result = search(&mut session, jobs, 3, limits, || {}).unwrap();
+    let result = search(&mut session, jobs, 3, class, || {}).unwrap();
     assert!(result.executed >= jobs / 3, "{} jobs ran", result.executed);
     let found = &result.elite[0];
     let cycles = figures::tick_cycles(&found.worst.record, figures::Model::Pessimistic);
@@ -521,10 +526,25 @@ fn check_search(jobs: u32, limits: bool) {
 
 #[test]
 fn a_short_search_finds_no_tick_over_its_budget() {
-    check_search(16, false);
+    check_search(16, JobClass::default());
 }
 
 #[test]
 fn a_short_search_with_limits_finds_no_tick_over_its_budget() {
-    check_search(2, true);
+    let class = JobClass {
+        limits: true,
+        ..JobClass::default()
+    };
+    check_search(2, class);
+}
+
+/// The same of curved passes in a region, within axis limits.
+#[test]
+fn a_short_search_of_curved_passes_finds_no_tick_over_its_budget() {
+    let class = JobClass {
+        limits: true,
+        constant: true,
+        region: true,
+    };
+    check_search(4, class);
 }

@@ -144,16 +144,20 @@ fn offset_and_interval_by_hand() {
                     || found.multiply.abs_diff(want.multiply) > 1
                     || (found.divide, found.root) != (0, 0)
             };
-            let others = ticks.records.iter().filter(differ).count();
+            // The first sample of a pass is evaluated in the planning before its tick.
+            let evaluated = ticks
+                .records
+                .iter()
+                .filter(|record| record.stages[Stage::Surface as usize].nominal > 0);
+            let others = evaluated.clone().filter(differ).count();
             assert_eq!(
                 others,
                 0,
                 "{}: {} is not {want:?} but {:?}",
                 PAPER[row].surface,
                 stage.name(),
-                ticks
-                    .records
-                    .iter()
+                evaluated
+                    .clone()
                     .find(differ)
                     .map(|record| record.operations[stage as usize])
             );

@@ -307,8 +307,8 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
         &self.motion.last
     }
 
-    /// Whether [`Self::plan`] has anything to do in this period: a job with axis limits is under way, and a pass ahead of the tool is not planned; or one without
-    /// them, and the current pass is not scanned for the step to the next one.
+    /// Whether [`Self::plan`] has anything to do in this period: a job with axis limits is under way, and a pass ahead of the tool is not planned, or the next tick not
+    /// prepared; or one without them, and the current pass is not scanned for the step to the next one; or no run is under way, and the next one is not prepared.
     #[must_use]
     #[inline]
     pub fn has_to_plan(&self) -> bool {

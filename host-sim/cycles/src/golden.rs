@@ -36,30 +36,43 @@ pub fn path() -> PathBuf {
     programs::golden("cycles.txt")
 }
 
-/// Path of the worst job that a search has found; its worst-case tick is part of the table.
-#[must_use]
-pub fn worst_job() -> PathBuf {
-    programs::golden("worst_tick.toml")
-}
+/// The worst jobs that searches have found, of `tests/golden`, with the names of their rows; the worst-case tick of each is part of the table.
+pub const WORST_JOBS: [(&str, &str); 4] = [
+    ("worst job found", "worst_tick"),
+    (
+        "worst job found, constant height, limits",
+        "worst_tick_constant_limits",
+    ),
+    (
+        "worst job found, constant height, region",
+        "worst_tick_constant_region",
+    ),
+    (
+        "worst job found, constant height, region, limits",
+        "worst_tick_constant_region_limits",
+    ),
+];
 
-/// Rows of the worst-case tick of [`worst_job`].
+/// Rows of the worst-case ticks of [`WORST_JOBS`].
 ///
 /// # Errors
-/// As [`MeasurementSession::run`]; the job cannot be read.
-pub fn worst_tick(setup: &MeasurementSetup) -> Result<Vec<Figure>, BudgetError> {
-    let path = worst_job();
-    let unusable = |error: &dyn std::fmt::Display| BudgetError::File(path.clone(), error.to_string());
-    let job = job_file::load(&path).map_err(|error| unusable(&error))?;
-    let prepared = prepare(&job).map_err(|error| unusable(&error))?;
-    let mut session = MeasurementSession::new(setup)?;
-    let run = session.run(&prepared, WORST_TICKS)?;
-    let worst = session.worst_tick(&prepared, &run)?;
-    Ok(Model::ALL
-        .map(|model| Figure::of_tick("worst job found", model, &worst.record))
-        .to_vec())
+/// As [`MeasurementSession::run`]; a job cannot be read.
+pub fn worst_ticks(setup: &MeasurementSetup) -> Result<Vec<Figure>, BudgetError> {
+    let mut figures = Vec::new();
+    for (name, file) in WORST_JOBS {
+        let path = programs::golden(&format!("{file}.toml"));
+        let unusable = |error: &dyn std::fmt::Display| BudgetError::File(path.clone(), error.to_string());
+        let job = job_file::load(&path).map_err(|error| unusable(&error))?;
+        let prepared = prepare(&job).map_err(|error| unusable(&error))?;
+        let mut session = MeasurementSession::new(setup)?;
+        let run = session.run(&prepared, WORST_TICKS)?;
+        let worst = session.worst_tick(&prepared, &run)?;
+        figures.extend(Model::ALL.map(|model| Figure::of_tick(name, model, &worst.record)));
+    }
+    Ok(figures)
 }
 
-/// Ticks of the worst job's run.
+/// Ticks of the worst jobs' runs.
 const WORST_TICKS: u32 = 2000;
 
 /// The table of these figures, and of each surface's operations.

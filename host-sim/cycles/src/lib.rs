@@ -51,14 +51,35 @@ pub const TICKS_WITHIN_LIMITS: u32 = 10_000;
 /// Ticks of a job of constant scallop height: the first pass, which is straight, and some curved ones.
 pub const TICKS_ON_CURVES: u32 = 8_000;
 
+/// Ticks of a job of constant scallop height with axis limits, or of one with a region: the first passes, and some links.
+pub const TICKS_ON_CURVES_WITHIN_LIMITS: u32 = 5_000;
+
+/// Greatest share of the period that a tick of a job of constant scallop height takes, in the pessimistic model, %.
+pub const TICK_SHARE_MAX_PCT: f64 = 3.0;
+
 /// Further jobs, of `tests/golden`, with their ticks: curved passes; step rates and limits, which are independent of the kind of surface.
-pub const FURTHER: [(&str, &str, u32); 7] = [
+pub const FURTHER: [(&str, &str, u32); 10] = [
     ("constant height, bicubic", "constant_bicubic", TICKS_ON_CURVES),
     ("constant height, rational", "constant_rational", TICKS_ON_CURVES),
     (
         "constant height, rational, pole",
         "constant_pole",
         TICKS_ON_CURVES,
+    ),
+    (
+        "constant height, limits",
+        "constant_limits",
+        TICKS_ON_CURVES_WITHIN_LIMITS,
+    ),
+    (
+        "constant height, region",
+        "constant_region",
+        TICKS_ON_CURVES_WITHIN_LIMITS,
+    ),
+    (
+        "constant height, region, limits",
+        "constant_region_limits",
+        TICKS_ON_CURVES_WITHIN_LIMITS,
     ),
     ("three axes at 400 kHz", "pulses", TICKS),
     ("limits, zig", "limits_zig", TICKS_WITHIN_LIMITS),

@@ -46,6 +46,12 @@ pub(super) struct Arguments {
     /// The jobs of the search have axis limits.
     #[arg(long, requires = "search")]
     limits: bool,
+    /// The jobs of the search have passes of constant scallop height.
+    #[arg(long, requires = "search")]
+    constant: bool,
+    /// The jobs of the search have a region.
+    #[arg(long, requires = "search")]
+    region: bool,
     /// Output file of the search.
     #[arg(
         long,
@@ -368,8 +374,8 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     report(arguments, &counted)?;
     let mut held = figures.concat();
     if arguments.check || arguments.bless {
-        let bar = spinner("counting the worst job");
-        held.extend(golden::worst_tick(&setup)?);
+        let bar = spinner("counting the worst jobs");
+        held.extend(golden::worst_ticks(&setup)?);
         bar.finish_and_clear();
     }
     hold(arguments, &held, &counts)

@@ -2,7 +2,9 @@
 
 use fastrand::Rng;
 
-use job::{Along, AxisLimits, Job, MachineSpec, NurbsSpec, Pattern, Side, Spacing, SurfaceSpec};
+use job::{
+    Along, AxisLimits, Job, MachineSpec, NurbsSpec, Pattern, Region, Side, Spacing, Start, SurfaceSpec,
+};
 
 /// Number of genes.
 const GENES: usize = 21;
@@ -35,6 +37,36 @@ enum Gene {
     Acceleration,
     Jerk,
 }
+
+/// What the jobs of a search have in common.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct JobClass {
+    /// Axis limits.
+    pub limits: bool,
+    /// Passes of constant scallop height.
+    pub constant: bool,
+    /// A region with a hole.
+    pub region: bool,
+}
+
+/// The region of [`JobClass::region`], in shares of the surface's parameters: slanted ends, a notch, a hole.
+const OUTLINE: [[f64; 2]; 7] = [
+    [0.05, 0.0],
+    [1.0, 0.0],
+    [1.0, 0.4],
+    [0.8, 0.5],
+    [1.0, 0.6],
+    [0.95, 1.0],
+    [0.2, 1.0],
+];
+const HOLE: [[f64; 2]; 6] = [
+    [0.45, 0.35],
+    [0.55, 0.3],
+    [0.65, 0.35],
+    [0.65, 0.5],
+    [0.55, 0.6],
+    [0.45, 0.5],
+];
 
 /// A job as numbers from 0 to 1, and the seed of its random details.
 #[derive(Clone, Debug, PartialEq)]
@@ -144,9 +176,10 @@ impl Genes {
         1 + (2.999 * self.gene(gene)) as usize
     }
 
-    /// Decodes the job, with axis limits or without.
+    /// Decodes the job of a class.
     #[must_use]
-    pub fn job(&self, limits: bool) -> Job {
+    pub fn job(&self, class: JobClass) -> Job {
+        let limits = class.limits;
         let mut random = Rng::with_seed(self.seed);
         let surface = match self.gene(Gene::Kind) {
             kind if kind < 0.1 => self.revolved(&mut random),
@@ -156,12 +189,13 @@ impl Genes {
             _ => self.ruled(&mut random),
         };
         let radius_mm = self.log(Gene::Radius, 0.05, 500.0);
+        let region = class.region.then(|| region_of(&surface));
         Job {
             surface,
             radius_mm,
             body: job::ToolBody::default(),
             setup: job::Setup::default(),
-            region: None,
+            region,
             // Up to 10 mm in a period of a millisecond, which is the limit.
             feed_mm_min: self.log(Gene::Arc, 60.0, 600_000.0),
             scallop_mm: radius_mm * self.log(Gene::Scallop, 1e-4, 0.95),
@@ -177,7 +211,11 @@ impl Genes {
             } else {
                 Pattern::Zigzag
             },
-            spacing: Spacing::Exact,
+            spacing: if class.constant {
+                Spacing::Constant(Start::Edge)
+            } else {
+                Spacing::Exact
+            },
             chord_mm: 0.5 * radius_mm,
             overrun_mm: 0.0,
             machine: if limits {
@@ -364,4 +402,15 @@ impl Genes {
             }
         }
     }
+}
+
+/// The region on a surface.
+fn region_of(surface: &SurfaceSpec) -> Region {
+    let [u, v] = surface.domain();
+    let place = |[from, to]: [f64; 2], share: f64| from + share * (to - from);
+    let on = |points: &[[f64; 2]]| {
+        let points = points.iter();
+        points.map(|[x, y]| [place(u, *x), place(v, *y)]).collect()
+    };
+    Region::new(vec![on(&OUTLINE), on(&HOLE)])
 }

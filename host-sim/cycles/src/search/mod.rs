@@ -19,7 +19,7 @@ use interp_core::State;
 use super::BudgetError;
 use super::figures::{Model, tick_cycles};
 use super::session::{MeasurementSession, WorstTick};
-use genes::Genes;
+use genes::{Genes, JobClass};
 use job::Job;
 use machine::Machine;
 use machine::prepare::{Prepared, prepare};
@@ -87,7 +87,7 @@ fn prepared(job: &Job) -> Option<(Prepared, bool)> {
     Some((prepared, samples >= SAMPLES_MIN))
 }
 
-/// Searches `jobs` jobs, with `limits` or without; the same seed gives the same jobs. Calls `progress` after each.
+/// Searches `jobs` jobs of a class; the same seed gives the same jobs. Calls `progress` after each.
 ///
 /// # Errors
 /// QEMU or the connection to it fails.
@@ -95,14 +95,14 @@ pub fn search(
     session: &mut MeasurementSession,
     jobs: u32,
     seed: u64,
-    limits: bool,
+    class: JobClass,
     mut progress: impl FnMut(),
 ) -> Result<SearchResult, BudgetError> {
     let mut random = Rng::with_seed(seed);
     let mut result = SearchResult::default();
     for _ in 0..jobs {
         let genes = draw(&mut random, &result.elite);
-        let job = genes.job(limits);
+        let job = genes.job(class);
         match prepared(&job) {
             Some((prepared, runs)) if runs || random.u8(..SHORT) == 0 => {
                 try_job(session, &mut result, genes, job, &prepared)?;

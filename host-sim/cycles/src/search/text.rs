@@ -84,6 +84,10 @@ pub fn text(job: &Job, comment: &str) -> String {
         "\n[tool]\nkind = \"ball\"\nradius_mm = {}",
         number(job.radius_mm)
     );
+    if let Some(region) = &job.region {
+        let loops = list(&region.loops, |points| list(points, |point| numbers(point)));
+        let _ = writeln!(text, "\n[region]\nloops = {loops}");
+    }
     let along = match job.along {
         Along::U => "u",
         Along::V => "v",
@@ -103,8 +107,12 @@ pub fn text(job: &Job, comment: &str) -> String {
         number(job.feed_mm_min),
         number(job.scallop_mm)
     );
-    if job.spacing == Spacing::FirstOrder {
-        text.push_str("spacing = \"first-order\"\n");
+    match job.spacing {
+        Spacing::Exact => {}
+        Spacing::FirstOrder => text.push_str("spacing = \"first-order\"\n"),
+        Spacing::Constant(start) => {
+            let _ = writeln!(text, "spacing = \"constant\"\nstart = \"{}\"", start.name());
+        }
     }
     let _ = writeln!(
         text,
@@ -124,14 +132,19 @@ pub fn text(job: &Job, comment: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::search::genes::Genes;
+    use crate::search::genes::{Genes, JobClass};
     use job::Origin;
 
     #[test]
     fn reads_back_as_the_same_job() {
         let mut random = fastrand::Rng::with_seed(1);
         for count in 0..200 {
-            let job = Genes::random(&mut random).job(count % 2 == 1);
+            let class = JobClass {
+                limits: count % 2 == 1,
+                constant: count % 3 == 1,
+                region: count % 5 == 1,
+            };
+            let job = Genes::random(&mut random).job(class);
             let mut read =
                 job_file::parse("a job", &text(&job, "one\ntwo")).unwrap_or_else(|error| panic!("{error:?}"));
             read.origin = Origin::default();

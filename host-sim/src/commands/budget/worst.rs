@@ -11,6 +11,7 @@ use super::Arguments;
 use cycles::PERIOD_CYCLES;
 use cycles::figures::{Model, tick_cycles};
 use cycles::measure::MeasurementSetup;
+use cycles::search::genes::JobClass;
 use cycles::search::{SearchResult, search, text};
 use cycles::session::{MeasurementSession, WorstTick};
 
@@ -85,18 +86,39 @@ fn print(result: &SearchResult, session: &MeasurementSession, seed: u64, out: &P
     }
 }
 
+/// The options of a class of jobs.
+fn options(class: JobClass) -> String {
+    let options = [
+        (class.limits, " --limits"),
+        (class.constant, " --constant"),
+        (class.region, " --region"),
+    ];
+    options
+        .iter()
+        .filter(|(is_set, _)| *is_set)
+        .map(|(_, name)| *name)
+        .collect()
+}
+
 /// Searches, prints the worst-case tick, and writes the job that causes it.
 pub(super) fn command(setup: &MeasurementSetup, jobs: u32, arguments: &Arguments) -> Result<()> {
     let Arguments {
         seed,
         limits,
+        constant,
+        region,
         ref out,
         json: as_json,
         ..
     } = *arguments;
     let mut session = MeasurementSession::new(setup)?;
     let bar = progress(u64::from(jobs), "searching");
-    let result = search(&mut session, jobs, seed, limits, || bar.inc(1))?;
+    let class = JobClass {
+        limits,
+        constant,
+        region,
+    };
+    let result = search(&mut session, jobs, seed, class, || bar.inc(1))?;
     bar.finish_and_clear();
     let Some(found) = result.elite.first() else {
         return Err(Failure::Failed(Some(format!(
@@ -105,7 +127,7 @@ pub(super) fn command(setup: &MeasurementSetup, jobs: u32, arguments: &Arguments
     };
     let comment = format!(
         "The worst job that `cargo sim budget --search {jobs} --seed {seed}{}` found.\n{}",
-        if limits { " --limits" } else { "" },
+        options(class),
         describe(&found.worst)
     );
     std::fs::write(

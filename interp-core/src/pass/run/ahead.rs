@@ -3,7 +3,7 @@
 
 use super::Run;
 use super::travel::{FirstSample, Next};
-use crate::fault::Result;
+use crate::fault::{Fault, Result};
 use crate::job::program::Job;
 use crate::pass::contact;
 use crate::pass::route::Piece;
@@ -16,6 +16,8 @@ pub(super) enum Prepared {
     First(FirstSample),
     /// The move along the pass.
     Move(Ahead),
+    /// Its fault, by this part of a period's arc.
+    Fault(f32, Fault),
 }
 
 /// A move that was made ahead.
@@ -36,10 +38,10 @@ impl Run {
     }
 
     pub(super) const fn is_ahead(&self) -> bool {
-        matches!(self.prepared, Prepared::Move(_))
+        matches!(self.prepared, Prepared::Move(_) | Prepared::Fault(..))
     }
 
-    /// Makes the move of the next tick by this part of a period's arc, if that is worth it. A fault is left for the tick, and so is the end of a pass.
+    /// Makes the move of the next tick by this part of a period's arc, if that is worth it. The tick reports its fault; the end of a pass is left for it.
     #[inline(never)]
     pub(crate) fn move_ahead(&mut self, job: &Job<'_>, feed_factor: f32) {
         if self.is_ahead() || !self.is_along() || self.buffer.patch().point {
@@ -57,10 +59,16 @@ impl Run {
             piece: travel.piece,
             log_speed_derivative: travel.path.log_speed_derivative,
         });
-        let is_made = self.move_far(job, step, feed_factor).is_ok() && self.is_along();
-        if !is_made && self.take_back(job).is_err() {
-            // That of the tick.
-            self.prepared = Prepared::Nothing;
+        let moved = self.move_far(job, step, feed_factor);
+        if moved.is_ok() && self.is_along() {
+            return;
+        }
+        let taken_back = self.take_back(job);
+        // A straight pass crosses one boundary in a tick: there the tick finds the fault, and where it is.
+        if self.travel.route.is_on_front()
+            && let Err(fault) = moved.and(taken_back)
+        {
+            self.prepared = Prepared::Fault(feed_factor, fault);
         }
     }
 
@@ -86,7 +94,12 @@ impl Run {
                 Ok(true)
             }
             Prepared::Move(_) => self.take_back(job).map(|()| false),
-            _ => Ok(false),
+            Prepared::Fault(of, fault) if of.to_bits() == feed_factor.to_bits() => Err(*fault),
+            Prepared::Fault(..) => {
+                self.prepared = Prepared::Nothing;
+                Ok(false)
+            }
+            Prepared::Nothing | Prepared::First(_) => Ok(false),
         }
     }
 

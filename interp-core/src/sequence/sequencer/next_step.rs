@@ -24,7 +24,10 @@ impl Sequencer {
     /// Whether [`Self::prepare_step`] has anything to do.
     pub(super) fn has_step_to_prepare(&self) -> bool {
         match self.phase {
-            Phase::Pass | Phase::Turn => self.next_step.is_none() && !self.plans_ref().0.point,
+            Phase::Pass | Phase::Turn => {
+                let stands = self.is_corrected && self.pace.is_at_rest();
+                self.next_step.is_none() && !stands && !self.plans_ref().0.point
+            }
             Phase::StepOver => !self.step_over.is_ahead(),
             Phase::Await => self.is_before_step_over() && !self.step_over.is_ahead(),
             _ => false,
