@@ -91,15 +91,23 @@ impl Travel {
     #[inline(never)]
     pub(super) fn sample<P: Pass>(&mut self, pass: &P, patch: &Patch, last: &mut Sample) -> Result<()> {
         let evaluated = patch.evaluate_on(pass, self.fraction)?;
-        self.emit(&Evaluated::of(patch, &evaluated), patch, last)
+        let (contact, _) = &evaluated;
+        self.check_fold(patch, &contact.offset)?;
+        self.emit(&Evaluated::of(patch, &evaluated), last);
+        Ok(())
     }
 
-    /// The sample of what was evaluated at the run's position. A fault leaves `last` unchanged.
     #[inline(always)]
-    fn emit(&mut self, at: &Evaluated, patch: &Patch, last: &mut Sample) -> Result<()> {
-        if patch.locator.folds(dot_hi(&self.offset, &at.offset)) {
+    fn check_fold(&self, patch: &Patch, offset: &[i32; 3]) -> Result<()> {
+        if patch.locator.folds(dot_hi(&self.offset, offset)) {
             return Err(folded());
         }
+        Ok(())
+    }
+
+    /// The sample of what was evaluated at the run's position.
+    #[inline(always)]
+    fn emit(&mut self, at: &Evaluated, last: &mut Sample) {
         if at.inv_interval_sq > self.max_inv_interval_sq {
             self.max_inv_interval_sq = at.inv_interval_sq;
             self.shape = at.shape;
@@ -113,7 +121,6 @@ impl Travel {
         last.cl_nm = at.located.cl_nm;
         last.inv_interval_sq = at.inv_interval_sq;
         self.ticks = self.ticks.wrapping_add(1);
-        Ok(())
     }
 
     /// The first sample of a pass, evaluated ahead; see [`Self::sample`].
@@ -124,7 +131,8 @@ impl Travel {
         patch: &Patch,
         last: &mut Sample,
     ) -> Result<()> {
-        self.emit(&first.at, patch, last)?;
+        self.check_fold(patch, &first.at.offset)?;
+        self.emit(&first.at, last);
         self.side = first.side;
         last.side = first.side;
         Ok(())
