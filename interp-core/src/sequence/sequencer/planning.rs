@@ -27,7 +27,7 @@ const SPARE_BEFORE_TURN: u32 = 30;
 /// step-over's planning.
 const PACE_CYCLES: u32 = 2_400;
 const PACE_BEGIN_CYCLES: u32 = 14_000;
-const LINK_PACE_CYCLES: u32 = 1_300;
+const LINK_PACE_CYCLES: u32 = 2_000;
 const STEP_OVER_CYCLES: u32 = 6_000;
 
 /// Cycles of the same of a hop, and of its planning.
