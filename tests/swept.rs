@@ -219,7 +219,7 @@ fn groove_that_no_sample_lies_in() {
         plain.failures
     );
     let cut = findings(&flat(0.3));
-    assert_eq!(cut.scallop_max.gap, 0);
+    assert_eq!(cut.scallop_max.passes[0], 0);
     assert!(cut.scallop_max.height_mm > 0.15, "{:?}", cut.scallop_max);
     assert!(cut.failures.iter().any(|line| line.contains("above the limit")));
     assert!(cut.shape.concave_radius.unwrap().radius_mm < 1.0);

@@ -57,16 +57,20 @@ fn add_case(seed: u64, start: Start, limits: Option<AxisLimits>, campaign: &mut 
             return;
         }
     }
-    let (excess, error) = excess(&job, &measured(&job));
+    let found = measured(&job);
+    let (excess, error) = excess(&job, &found);
     // Where the measuring error is large, a crest that was found above the limit is above it all the same.
     if error > ERROR_SHARE_MAX && excess <= ERROR_SHARE_MAX {
         campaign.unmeasured += 1;
     } else if excess > error.min(ERROR_SHARE_MAX) {
         campaign.above += 1;
         println!(
-            "{shape:?} {seed} {start:?}: {:.4} % above the limit, within {:.4} %",
+            "{shape:?} {seed} {start:?}: {:.4} % above the limit, within {:.4} %, passes {:?} at u = {:.5}, v = {:.5}",
             100.0 * excess,
-            100.0 * error
+            100.0 * error,
+            found.scallop_max.passes,
+            found.scallop_max.u,
+            found.scallop_max.v
         );
     } else {
         campaign.held += 1;

@@ -61,7 +61,7 @@ pub(super) fn json(
         "scallop_error": {
             "path_mm": error.path_mm, "rounding_mm": error.rounding_mm, "stations_mm": error.stations_mm, "search_mm": error.search_mm,
         },
-        "scallop_at": null_unless(measured, json!({ "u": most.u, "v": most.v, "gap": most.gap, "place_mm": most.point_mm.to_array() })),
+        "scallop_at": null_unless(measured, json!({ "u": most.u, "v": most.v, "gap": most.passes[0], "passes": most.passes, "place_mm": most.point_mm.to_array() })),
         "scallop_area_by_tenth": found.scallop_histogram,
         "gouge_max_mm": null_unless(found.gouge_verdict != Verdict::Unknown, json!(found.gouge_max_mm())),
         "gouge_floor_mm": found.gouge_floor_mm,
@@ -244,8 +244,8 @@ fn scallop(job: &Job, found: &SweptResult) {
         um(found.measurement_error_mm),
         um(job.scallop_mm),
         most.height_mm / job.scallop_mm,
-        most.gap,
-        most.gap + 1,
+        most.passes[0],
+        most.passes[1],
         most.u,
         most.v
     );

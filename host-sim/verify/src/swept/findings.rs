@@ -40,8 +40,8 @@ pub struct HighestScallop {
     pub u: f64,
     /// Parameter v.
     pub v: f64,
-    /// Gap between passes, from 0: between pass `gap` and the next.
-    pub gap: u32,
+    /// The passes on both sides, from 0.
+    pub passes: [u32; 2],
     /// Point on the surface, mm.
     pub point_mm: DVec3,
 }
@@ -268,10 +268,7 @@ impl SweptResult {
         let (most, limit) = (&self.scallop_max, job.scallop_mm);
         let place = format!(
             "between passes {} and {} at u = {:.6}, v = {:.6}",
-            most.gap,
-            most.gap + 1,
-            most.u,
-            most.v
+            most.passes[0], most.passes[1], most.u, most.v
         );
         match self.scallop_verdict {
             Verdict::Met => None,
@@ -435,7 +432,7 @@ fn extreme(oracle: &Oracle, parts: &Measurements<'_>) -> (HighestScallop, f64, [
         height_mm,
         u,
         v,
-        gap: number(index),
+        passes: parts.gaps[index].indices.map(number),
         point_mm: crest.point_mm,
     };
     (extreme, own_error_mm, possible)

@@ -114,7 +114,7 @@ fn plane_leaves_the_ridge_of_two_circles() {
     for steps in [50, 3000] {
         let found = measured(&job(plane(), Along::U, Side::Up, 0.01), &sides, steps);
         agrees(&found, flat(0.06 * 20.0));
-        assert_eq!(found.scallop_max.gap, 2);
+        assert_eq!(found.scallop_max.passes[0], 2);
         assert!((found.scallop_max.v - 0.07).abs() < 1e-5);
         assert!(found.measurement_error_mm < 4e-6, "{:?}", found.measurement_error);
         let gaps = sides.windows(2).map(|ends| 20.0 * (ends[1] - ends[0]));
@@ -153,7 +153,7 @@ fn cylinder_along_its_axis() {
             let crest = centre * cos - sign * (RADIUS * RADIUS - (centre * sin).powi(2)).sqrt();
             agrees(&found, sign * (crest - radius));
             assert!(found.measurement_error_mm < 1e-4 * found.scallop_max.height_mm + 4e-6);
-            assert_eq!((found.scallop_max.gap, found.gouge), (1, None));
+            assert_eq!((found.scallop_max.passes[0], found.gouge), (1, None));
         }
     }
 }
@@ -418,7 +418,7 @@ fn groove_between_passes_stays_uncut() {
     );
     let exact = -bottom[2] + 10.0 - (100.0_f64 - 1.0).sqrt();
     agrees(&found, exact);
-    assert_eq!(found.scallop_max.gap, 5);
+    assert_eq!(found.scallop_max.passes[0], 5);
     assert_eq!(found.gouge, None);
     assert!(
         found.failures.iter().any(|line| line.contains("scallop")),

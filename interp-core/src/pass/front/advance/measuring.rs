@@ -2,34 +2,37 @@
 
 use core::ops::DerefMut;
 
-use super::{Advance, CHUNK, Task};
+use super::{Advance, CHUNK, MEASUREMENTS, Task};
 use crate::job::program::Job;
 use crate::math::arith::{to_f32, truncated};
+use crate::math::number::Bounded;
 use crate::pass::front::crest::{CURRENT, NEXT, Place, Tools};
 use crate::pass::front::side::UNIT;
 use crate::pass::front::spline::Cubic;
 use crate::pass::front::table::{Column, Table};
 
-/// Share of the limit to which the crests of a straight front are measured; by how much more than the excess a front is lowered.
+/// Share of the limit to which the crests of a straight front are measured; by how much more than the excess a front is lowered, and how many times as much after the last measurement.
 const LEVEL_MARGIN: f32 = 0.9999;
 const LOWER: f32 = 1.1;
+const LAST: i32 = 2;
 /// Places in each interval at which crests are measured, and the bend of a front over an interval above which all of them are, as a share of the step there: of short intervals, and of long ones.
-const PLACES: u16 = 3;
-const BENT: f32 = 0.1;
+const PLACES: u16 = 4;
+const BENT: f32 = 0.06;
 const BENT_COARSE: f32 = 0.02;
 /// Scallop height to which the crests are measured, as a share of the limit: between places near each other, and farther apart.
 const MEASURED_MARGIN: f32 = 0.990;
 const MEASURED_MARGIN_COARSE: f32 = 0.983;
 
 impl Advance {
-    /// Places at which crests are measured: three in each interval, its middle first, then both ends.
+    /// Places at which crests are measured: four in each interval, its middle first, then its start and the quarters; at last both ends.
     pub(super) fn crest_place(&self, number: u16) -> Place {
         let intervals = self.stations.count().saturating_sub(1);
         let station = number / PLACES;
         if station < intervals {
             let at = match number % PLACES {
                 0 => 1 << 30,
-                1 => 1 << 29,
+                1 => 0,
+                2 => 1 << 29,
                 _ => 3 << 29,
             };
             (station, at)
@@ -56,14 +59,12 @@ impl Advance {
     /// Whether the front is bent so much in an interval that its middle alone does not tell the crest.
     fn is_bent<W: DerefMut<Target = [i32]>>(&self, job: &Job<'_>, table: &Table<W>, station: u16) -> bool {
         let length = self.stations.length(job, station);
-        let bend = Cubic::of(table, NEXT, station, length)
-            .point(1 << 30, length)
-            .bend;
-        let [front, next] =
-            [CURRENT, NEXT].map(|columns| Cubic::of(table, columns, station, length).value(1 << 30));
-        let step = to_f32(next.saturating_sub(front)) * UNIT;
+        let [front, next] = [CURRENT, NEXT].map(|columns| Cubic::of(table, columns, station, length));
+        let step = to_f32(next.value(1 << 30).saturating_sub(front.value(1 << 30))) * UNIT;
         let bent = if self.is_coarse { BENT_COARSE } else { BENT };
-        !(bend.abs() * length * length <= bent * step)
+        let [start, end] = [0, i32::MAX].map(|at| next.point(at, length).bend.abs());
+        // It is linear between.
+        !(start.at_least(end) * length * length <= bent * step)
     }
 
     /// Whether the crest is to be measured at a place.
@@ -118,6 +119,13 @@ impl Advance {
         };
         let Some(excess) = self.search.work(&mut tools, table, margin) else {
             return;
+        };
+        // What the last measurement lowers is not measured again.
+        let is_last = self.measured + 1 >= MEASUREMENTS;
+        let excess = if is_last {
+            excess.saturating_mul(LAST)
+        } else {
+            excess
         };
         self.note_excess(table, self.mark_of(self.station), excess);
         self.end_crest(table);
