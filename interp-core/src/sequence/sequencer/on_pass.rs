@@ -14,7 +14,7 @@ use crate::sequence::legs::{Goal, Leg};
 use crate::sequence::link::check_faces_up;
 use crate::sequence::turning::Part;
 
-/// Arc before the end of a pass on a front from which on the progress is corrected in each period, units of 2^-10 nm, and the part of the difference that is taken
+/// Arc before the end of a pass from which on the progress is corrected in each period, units of 2^-10 nm, and the part of the difference that is taken
 /// in a period: a twelfth of 0.15 um takes 3 % of the jerk limit.
 const END_Q10: i64 = 300_000 << 10;
 const END_PARTS: i64 = 12;
@@ -198,7 +198,7 @@ impl Sequencer {
         if self.phase != Phase::Pass || now.point {
             return;
         }
-        if now.route.is_on_front() && self.correct_to_end(run) {
+        if self.correct_to_end(run) {
             return;
         }
         let (now, _) = both(&mut self.plans, self.second);
@@ -224,12 +224,13 @@ impl Sequencer {
         self.correction = Some(arc_q10 - self.follower.arc_q10());
     }
 
-    /// Corrects the progress by the arc left, near the end of a pass on a front: the stations are far apart there, and what is left of their error would be in the
-    /// last step. Returns whether it is near.
+    /// Corrects the progress by the arc left, near the end of a pass: what is left of the stations' error would be in the last step. On a front they are far apart;
+    /// where the ball goes around an edge, the centre moves by many times that error. Returns whether it is near.
     #[inline(never)]
     fn correct_to_end(&mut self, run: &Run) -> bool {
         let (now, _) = both(&mut self.plans, self.second);
-        let left_q10 = now.plan.length_q10() - self.follower.arc_q10();
+        let end_q10 = if now.turns() { now.tail_q10 } else { now.plan.length_q10() };
+        let left_q10 = end_q10 - self.follower.arc_q10();
         if left_q10 >= END_Q10 {
             return false;
         }
