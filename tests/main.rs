@@ -43,6 +43,7 @@ mod script;
 mod sequences;
 mod session;
 mod settings;
+mod small_edges;
 mod spindle;
 mod standing;
 mod stored;

@@ -6,12 +6,13 @@ use super::newton::{self, Reach, Sweep};
 use super::pace::{Course, Use};
 use super::plan::{COEFFICIENTS, Cursor, Lead, Plan};
 use super::road::GateSearch;
-use super::walk::Walker;
+use super::walk::{NODES_COUNT, Walker};
 use crate::math::arith::{inverse_sqrt, sqrt, truncated};
 use crate::math::number::{Bounded, cube_root};
 
-/// Weight of the barrier in the first steps, and in the last one.
-const BARRIER_FIRST: f32 = 0.05;
+/// Weight of the barrier in the first steps, with an end at speed, and in the last one. A greater one leads away from the limits first.
+const BARRIER_FIRST: f32 = 0.02;
+const BARRIER_FIRST_AT_SPEED: f32 = 0.05;
 const BARRIER_LAST: f32 = 2.5e-4;
 const STEPS_FIRST: u8 = 3;
 /// How it changes after a step: where the step could go as far as the first of these shares of its way, or of the second, or less. A step that is cut
@@ -77,8 +78,9 @@ mod cycles {
     pub(super) const GATE_PLACE: u32 = 22_000;
     /// The start of a plan with an end at speed.
     pub(super) const BLEND: u32 = 25_000;
-    /// Something for each coefficient.
+    /// Something for each coefficient, of the most that there may be; apart from the coefficients.
     pub(super) const LIST: u32 = 15_000;
+    pub(super) const LEAST: u32 = 1_500;
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -220,15 +222,23 @@ impl Planner {
         } else {
             0
         };
+        let nodes = if plan.is_counted() {
+            plan.intervals
+        } else {
+            NODES_COUNT
+        };
+        let of_nodes = |cycles: u32| {
+            cycles::LEAST + (cycles - cycles::LEAST) * u32::from(nodes) / u32::from(NODES_COUNT)
+        };
         match self.stage {
-            Stage::Walk => self.walker.cycles(),
+            Stage::Walk => self.walker.cycles(plan),
             Stage::Factor | Stage::Relax => cycles::FACTOR + jump,
             Stage::Assemble => cycles::ASSEMBLE + jump,
-            Stage::Solve => cycles::SOLVE,
+            Stage::Solve => of_nodes(cycles::SOLVE),
             Stage::Reach => cycles::REACH + jump,
             Stage::Check => cycles::CHECK,
             Stage::Scale if plan.pinned() != [0; 2] => cycles::BLEND,
-            Stage::Weigh | Stage::Scale | Stage::Take | Stage::Finish => cycles::LIST,
+            Stage::Weigh | Stage::Scale | Stage::Take | Stage::Finish => of_nodes(cycles::LIST),
             Stage::Gate if self.gate.is_placed() => cycles::GATE,
             Stage::Gate => cycles::GATE_PLACE,
             Stage::Done => 0,
@@ -430,7 +440,7 @@ impl Planner {
         let most = if self.steps_left(plan, share * lasts, deadlines) <= STEPS_AT_END {
             BARRIER_AT_END
         } else {
-            BARRIER_FIRST
+            BARRIER_FIRST_AT_SPEED
         };
         if self.relaxed == 1.0 {
             self.barrier = (change * self.barrier).at_least(last).at_most(most);
@@ -460,7 +470,12 @@ impl Planner {
         self.weight = 1.0 / sum.at_least(1e-9);
         self.lasts = sum * plan.step_s / plan.limits.period;
         self.factor = f32::MAX;
-        (self.step, self.barrier) = (0, BARRIER_FIRST);
+        self.step = 0;
+        self.barrier = if plan.pinned() == [0; 2] {
+            BARRIER_FIRST
+        } else {
+            BARRIER_FIRST_AT_SPEED
+        };
         self.sweep = Sweep::START;
     }
 

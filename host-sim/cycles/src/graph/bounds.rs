@@ -440,6 +440,11 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         36,
         "pieces of the planning of a period: PIECES_MAX",
     ),
+    (
+        "interp_core::sequence::sequencer::planning::next_own_cycles",
+        2,
+        "ends of a plan that are compared",
+    ),
     ("interp_core::feed::newton::rows::Place::rows", 3, "axes"),
     ("interp_core::feed::plan::motion::MotionAt::each_axis", 3, "axes"),
     (
@@ -473,6 +478,11 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "curves of a hop",
     ),
     ("interp_core::sequence::hop::Hop::speed", 3, "curves of a hop"),
+    (
+        "interp_core::sequence::lookahead::stations::patch_lengths",
+        3,
+        "halves of the patch; axes",
+    ),
     (
         "interp_core::sequence::lookahead::stations::widen",
         3,

@@ -9,10 +9,11 @@ use super::knots::find_knots;
 use super::limits::MotionLimits;
 use super::lists::Lists;
 use super::plan::Plan;
-use super::stations::Station;
+use super::stations::{STATIONS_MAX, Station};
 use crate::math::arith::sqrt;
 use crate::math::number::Bounded;
 use nodes::GROWTH;
+pub(crate) use nodes::NODES_COUNT;
 
 /// Spacing of nodes that is fine enough, s; its growth per second away from busy places; the widest, s.
 const SPACING: f32 = 5e-3;
@@ -26,6 +27,12 @@ const CELLS_A_PORTION: u16 = 84;
 const NODES_A_PORTION: u16 = 60;
 const PLACES_A_PORTION: u16 = 50;
 const KNOTS_A_PORTION: u16 = 40;
+
+/// Cycles of a portion without any items.
+const PORTION_LEAST: u32 = 1_500;
+/// Most stations.
+const STATIONS: u16 = 168;
+const _: () = assert!(STATIONS as usize == STATIONS_MAX);
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stage {
@@ -148,18 +155,36 @@ impl Walker {
     }
 
     /// Cycles of the next portion, by the pessimistic model of `cargo sim budget`.
-    pub(crate) const fn cycles(&self) -> u32 {
-        match self.stage {
-            Stage::Caps => 18_100,
-            Stage::Jumps | Stage::Means | Stage::Knots => 10_500,
-            Stage::Rests => 12_000,
-            Stage::Backwards | Stage::Busy => 25_000,
-            Stage::Forwards | Stage::Flatten => 17_000,
-            Stage::TryEven | Stage::TryGrowing | Stage::Coarsen | Stage::Bisect(_) | Stage::Times => 25_500,
-            Stage::Increments => 21_500,
-            Stage::Nodes => 15_000,
-            Stage::Done => 0,
-        }
+    pub(crate) fn cycles(&self, plan: &Plan) -> u32 {
+        let stations = plan.stations.count();
+        let left = |of: u16, most: u16| of.saturating_sub(self.index).min(most);
+        // Of so many items, by the cycles of the most that there may be.
+        let (cycles, [count, most]) = match self.stage {
+            Stage::Caps => (18_100, [left(stations, STATIONS_A_PORTION), STATIONS_A_PORTION]),
+            Stage::Jumps => (12_000, [JUMPS_A_PORTION, JUMPS_A_PORTION]),
+            Stage::Rests => (12_000, [stations, STATIONS]),
+            Stage::Backwards | Stage::Busy => (25_000, [stations, STATIONS]),
+            Stage::Flatten => (17_000, [stations, STATIONS]),
+            Stage::Forwards => (17_000, [left(stations, CELLS_A_PORTION), CELLS_A_PORTION]),
+            Stage::TryEven | Stage::TryGrowing | Stage::Coarsen | Stage::Bisect(_) | Stage::Times => (
+                25_500,
+                [self.intervals + stations / 4, NODES_COUNT + STATIONS / 4],
+            ),
+            Stage::Increments => (21_500, [left(self.times, PLACES_A_PORTION), PLACES_A_PORTION]),
+            Stage::Means => (
+                10_500,
+                [left(self.intervals + 2, NODES_A_PORTION), NODES_A_PORTION],
+            ),
+            Stage::Nodes => (
+                15_000,
+                [left(self.intervals + 1, PLACES_A_PORTION), PLACES_A_PORTION],
+            ),
+            Stage::Knots => (10_500, [left(self.intervals, KNOTS_A_PORTION), KNOTS_A_PORTION]),
+            Stage::Done => return 0,
+        };
+        let count = if plan.is_counted() { count.min(most) } else { most };
+        let [count, most] = [count, most].map(u32::from);
+        PORTION_LEAST + (cycles - PORTION_LEAST) * count / most
     }
 
     /// One portion; whether the walk is complete. `least`: periods that the plan has to take at least, for the planning so far.

@@ -22,8 +22,9 @@ const SPACING_WORTH: f32 = 4e-3;
 /// Longest mean of a walk with an end at speed, s, and the time for which it has that speed, as a multiple of it.
 pub(super) const MEAN_MAX: f32 = 0.05;
 
-/// Periods that the rest of the planning takes: for a node, for a place of the check, and for what is left.
+/// Periods that the rest of the planning takes: for a node with an end at speed, and from rest to rest; for a place of the check, and for what is left.
 const PERIODS_A_NODE: f32 = 2.5;
+const PERIODS_A_NODE_TO_REST: f32 = 2.9;
 const PERIODS_A_PLACE: f32 = 0.067;
 const PERIODS_A_PLAN: f32 = 52.0;
 
@@ -60,14 +61,15 @@ impl Walker {
         let wanted = whole(time / SPACING_WORTH.at_least(self.finest));
         self.intervals = wanted.clamp(NODES_MIN.min(most), most);
         if least > 0 {
-            let (lasts, plan) = if self.is_from_rest_to_rest() {
-                (WALKED_TO_REST * (time + self.mean_s), PERIODS_A_PLAN)
+            let (lasts, plan, node) = if self.is_from_rest_to_rest() {
+                let lasts = WALKED_TO_REST * (time + self.mean_s);
+                (lasts, PERIODS_A_PLAN, PERIODS_A_NODE_TO_REST)
             } else {
-                (WALKED * time, PERIODS_A_PLAN + PERIODS_A_STOP)
+                (WALKED * time, PERIODS_A_PLAN + PERIODS_A_STOP, PERIODS_A_NODE)
             };
             let lasts = lasts / limits.period;
             let left = lasts * (1.0 - PERIODS_A_PLACE) - plan - to_f32(i64::from(least));
-            let planned = whole(left / PERIODS_A_NODE);
+            let planned = whole(left / node);
             let fewest = NODES_FEW.min(most);
             self.intervals = self.intervals.min(planned).max(fewest);
         }
@@ -201,5 +203,5 @@ impl Walker {
 const NODES_LEAST: u16 = 12;
 
 /// Most intervals as u16.
-const NODES_COUNT: u16 = 160;
+pub(crate) const NODES_COUNT: u16 = 160;
 const _: () = assert!(NODES_COUNT as usize == NODES_MAX);

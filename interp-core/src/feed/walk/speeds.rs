@@ -14,7 +14,7 @@ const FLAT: f32 = 1.0;
 
 /// Speed over a jump below which the walk rests there, as a share of the one that a ramp without constant acceleration reaches; nodes by which the rest is
 /// longer than the mean.
-const REST_BELOW: f32 = 0.05;
+const REST_BELOW: f32 = 0.5;
 const REST_NODES: f32 = 1.0;
 
 /// Stations on either side of a jump that the speed over it bounds.
@@ -31,13 +31,12 @@ impl Walker {
         share: f32,
     ) {
         let mut square = 1.0 / limits.inverse_speed_sqr(q);
-        let mut jerk = f32::MAX;
-        for (axis, [first, second, third]) in limits.axes.iter().zip(q) {
+        for (axis, [_, second, third]) in limits.axes.iter().zip(q) {
             square = square.at_most(0.85 * axis.acceleration / second.abs().at_least(1e-9));
             let speed = cube_root(0.7 * axis.jerk / third.abs().at_least(1e-9));
             square = square.at_most(speed * speed);
-            jerk = jerk.at_most(0.8 * axis.jerk / first.abs().at_least(SLOPE_MIN));
         }
+        let jerk = least_jerk(q, limits);
         let speed = sqrt(square);
         let mut accel = f32::MAX;
         for (axis, [first, second, _]) in limits.axes.iter().zip(q) {
@@ -68,7 +67,15 @@ impl Walker {
         if speed >= limits.feed {
             return;
         }
-        let speed = if self.may_rest(plan, jump) && speed < self.rest_below() {
+        let jerk = [jump, jump + 1]
+            .map(|station| least_jerk(&plan.stations.get(station).q, limits))
+            .into_iter()
+            .fold(f32::MAX, f32::at_most);
+        let accel = [jump, jump + 1].map(|station| get(lists, ACCEL, station).abs());
+        let accel = accel.into_iter().fold(f32::MAX, f32::at_most);
+        // Below this a rest is better: the walk's mean would not leave so narrow a slow place.
+        let rest_below = REST_BELOW * accel * accel / jerk;
+        let speed = if self.may_rest(plan, jump) && speed < rest_below {
             0.0
         } else {
             speed
@@ -88,11 +95,6 @@ impl Walker {
             let square = get(lists, SPEED_SQR, station).at_most(most * most);
             put(lists, SPEED_SQR, station, square);
         }
-    }
-
-    /// Speed over a jump, mm/s, below which a rest there is better: the walk's mean would not leave so narrow a slow place.
-    fn rest_below(&self) -> f32 {
-        REST_BELOW * self.acceleration * self.acceleration / self.jerk
     }
 
     /// Whether the walk can rest at a jump: there are two cells at least to the next jump and to the ends.
@@ -200,4 +202,13 @@ impl Walker {
         }
         self.duration += later;
     }
+}
+
+/// Jerk along the path that every axis allows where nothing else needs any, mm/s^3.
+fn least_jerk(q: &Derivatives, limits: &MotionLimits) -> f32 {
+    let mut jerk = f32::MAX;
+    for (axis, [first, _, _]) in limits.axes.iter().zip(q) {
+        jerk = jerk.at_most(0.8 * axis.jerk / first.abs().at_least(SLOPE_MIN));
+    }
+    jerk
 }

@@ -15,7 +15,7 @@ use crate::feed::turn::{self, Turn, TurnEnd};
 use crate::feed::{MM_PER_Q10, to_q10};
 use crate::job::program::Job;
 use crate::job::{AxisLimits, Pattern, Spacing};
-use crate::math::number::{MM_PER_NM, nm_to_mm, to_f32};
+use crate::math::number::{Bounded, MM_PER_NM, nm_to_mm, to_f32};
 use crate::pass::lines::{self, NextPass, RegionLines};
 use crate::pass::patch::Patch;
 use crate::pass::route::{Piece, Route};
@@ -115,8 +115,10 @@ pub(crate) struct Lookahead {
     looks: u16,
     cells: u16,
     cell_fraction: u64,
-    /// Mean length of a patch of the last pass, mm.
+    /// Mean length of a patch of the last pass, mm, or the greatest by the way of the centre around an edge; whether there was one. The greatest so far.
     patch_mm: f32,
+    has_edge: bool,
+    centre_mm: f32,
     /// What is continuous if the direction of the tool centre's path is, at the end of the last patch: 1 - r k along the path, r times the twist;
     /// on a front 1 - r k across, too.
     bend: [f32; 3],
@@ -171,6 +173,8 @@ impl Lookahead {
         cells: 1,
         cell_fraction: 0,
         patch_mm: 0.0,
+        has_edge: false,
+        centre_mm: 0.0,
         bend: [0.0; 3],
         is_smooth: false,
         speed: PathSpeed::STILL,
@@ -195,6 +199,7 @@ impl Lookahead {
     pub(crate) const fn restart(&mut self) {
         self.line = None;
         (self.patch_mm, self.pass_mm) = (0.0, 0.0);
+        self.has_edge = false;
         self.without = 0;
         self.whole = None;
         self.task = Task::Done;
@@ -254,6 +259,7 @@ impl Lookahead {
         out.pass = pass;
         out.route = route;
         out.cells = 0;
+        self.centre_mm = 0.0;
         (out.point, out.is_tip) = (false, false);
         out.full_pace = 1.0;
         out.next = None;
@@ -460,7 +466,8 @@ impl Lookahead {
     ) -> Result<bool> {
         let patches = f32::from(self.patches.saturating_add(1));
         self.pass_mm = to_f32(self.start_q10 - out.head_q10) * MM_PER_Q10;
-        self.patch_mm = self.pass_mm / patches;
+        self.patch_mm = (self.pass_mm / patches).at_least(self.centre_mm);
+        self.has_edge = self.centre_mm > 0.0;
         let header = job.header;
         out.interval = interval_of(self.maximum.inv_interval_sq);
         if let Some(route) = lines.take(header) {

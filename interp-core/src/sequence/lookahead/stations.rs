@@ -24,6 +24,9 @@ pub(super) const LOOKS_MAX: u16 = 32;
 /// Cells between kept stations of a patch that are fine as they are.
 const CELLS_MANY: u16 = 8;
 
+/// Share of the centre's way that counts as length of a patch.
+const CENTRE_SHARE: f32 = 0.5;
+
 /// Change of 1 - r k from patch to patch below which it is rounding of single precision.
 const NO_JUMP: f32 = 4e-6;
 
@@ -40,7 +43,13 @@ impl Lookahead {
         let whole = |value: f32| u16::try_from(truncated(value)).unwrap_or(u16::MAX);
         let whole_part = self.piece.end().saturating_sub(self.piece.start());
         let part = |cells: u16| whole_part.checked_div(u64::from(cells)).unwrap_or(u64::MAX);
-        let length = self.patch_length();
+        let [length, centre] = self.patch_lengths();
+        // Where the ball goes around an edge, its centre moves much farther than the contact, and the path bends by that.
+        let by_centre = CENTRE_SHARE * centre;
+        if by_centre > length {
+            self.centre_mm = self.centre_mm.at_least(by_centre);
+        }
+        let length = length.at_least(by_centre);
         if out.cells == 0 {
             let [start, end] = out.route.ends;
             let is_part = job.header.edges > 0 || self.whole.is_some();
@@ -67,6 +76,10 @@ impl Lookahead {
                 length
             };
             out.cells = whole(mean / CELL_KEPT_MM).clamp(1, fit);
+            if self.patch_mm == 0.0 || self.has_edge || self.centre_mm > 0.0 {
+                // The patches of a first pass are not known yet, and around an edge derivatives change within a patch.
+                out.cells = out.cells.max(CELLS_MANY.min(fit));
+            }
             if spans == 1 {
                 // A place between the rests.
                 out.cells = out.cells.max(2);
@@ -86,17 +99,16 @@ impl Lookahead {
         out.plan.stations.note_spacing(length / f32::from(self.cells));
     }
 
-    /// Length of the patch, roughly, mm; 0 where its surface is not evaluated.
-    fn patch_length(&self) -> f32 {
+    /// Lengths of the contact's and of the centre's way over the patch, roughly, mm; 0 where its surface is not evaluated.
+    fn patch_lengths(&self) -> [f32; 2] {
         let at = |fraction| {
-            self.patch
-                .evaluate_on_line(fraction)
-                .map(|(_, located)| located.cc_nm)
+            let located = self.patch.evaluate_on_line(fraction);
+            located.map(|(_, located)| [located.cc_nm, located.cl_nm])
         };
         let [start, end] = self.piece.range;
         let middle = start + end.saturating_sub(start).div_ceil(2);
         let (Ok(start), Ok(middle), Ok(end)) = (at(start), at(middle), at(end)) else {
-            return 0.0;
+            return [0.0; 2];
         };
         let apart = |from: &[i32; 3], to: &[i32; 3]| {
             let mut sum = 0.0;
@@ -106,7 +118,13 @@ impl Lookahead {
             }
             sqrt(sum)
         };
-        apart(&start, &middle) + apart(&middle, &end)
+        let [mut contact, mut centre] = [0.0; 2];
+        for [from, to] in [[&start, &middle], [&middle, &end]] {
+            let ([from_cc, from_cl], [to_cc, to_cl]) = (from, to);
+            contact += apart(from_cc, to_cc);
+            centre += apart(from_cl, to_cl);
+        }
+        [contact, centre]
     }
 
     /// The derivatives that can be taken after a station.

@@ -18,6 +18,7 @@ pub(super) struct WholePass {
     maximum: PassMaximum,
     patch_mm: f32,
     pass_mm: f32,
+    has_edge: bool,
 }
 
 impl Lookahead {
@@ -42,6 +43,7 @@ impl Lookahead {
             maximum: self.maximum,
             patch_mm: self.patch_mm,
             pass_mm: self.pass_mm,
+            has_edge: self.has_edge,
         });
         route.begin_at(path);
         self.begin(out.pass, route, &Turn::NONE, out);
@@ -53,6 +55,7 @@ impl Lookahead {
         self.whole = None;
         self.maximum = whole.maximum;
         (self.patch_mm, self.pass_mm) = (whole.patch_mm, whole.pass_mm);
+        self.has_edge = whole.has_edge;
         out.interval = whole.interval;
         (out.next, out.steps_over, out.is_last) = (whole.next, whole.steps_over, whole.is_last);
         self.finish_short(out);

@@ -229,7 +229,11 @@ impl Sequencer {
     #[inline(never)]
     fn correct_to_end(&mut self, run: &Run) -> bool {
         let (now, _) = both(&mut self.plans, self.second);
-        let end_q10 = if now.turns() { now.tail_q10 } else { now.plan.length_q10() };
+        let end_q10 = if now.turns() {
+            now.tail_q10
+        } else {
+            now.plan.length_q10()
+        };
         let left_q10 = end_q10 - self.follower.arc_q10();
         if left_q10 >= END_Q10 {
             return false;
