@@ -440,11 +440,6 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         36,
         "pieces of the planning of a period: PIECES_MAX",
     ),
-    (
-        "interp_core::sequence::sequencer::planning::next_own_cycles",
-        2,
-        "ends of a plan that are compared",
-    ),
     ("interp_core::feed::newton::rows::Place::rows", 3, "axes"),
     ("interp_core::feed::plan::motion::MotionAt::each_axis", 3, "axes"),
     (
