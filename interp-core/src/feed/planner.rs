@@ -80,7 +80,7 @@ mod cycles {
     pub(super) const BLEND: u32 = 25_000;
     /// Something for each coefficient, of the most that there may be; apart from the coefficients.
     pub(super) const LIST: u32 = 15_000;
-    pub(super) const LEAST: u32 = 1_500;
+    pub(super) const LEAST: u32 = 2_000;
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

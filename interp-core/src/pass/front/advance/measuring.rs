@@ -68,11 +68,10 @@ impl Advance {
     }
 
     /// Whether the crest is to be measured at a place.
-    fn has_crest<W: DerefMut<Target = [i32]>>(&self, job: &Job<'_>, table: &Table<W>, number: u16) -> bool {
+    fn has_crest<W: DerefMut<Target = [i32]>>(&self, table: &Table<W>, number: u16) -> bool {
         let places = PLACES * self.stations.count().saturating_sub(1);
         let station = self.mark_of(number);
         let bit = if number < places { 1 } else { 2 };
-        let is_middle = number.is_multiple_of(PLACES) || number >= places;
         let is_there = if number < places {
             self.is_interval_within(station)
         } else {
@@ -83,7 +82,7 @@ impl Advance {
         }
         let [low, high] = [station, station.saturating_add(1)].map(|at| table.word(Column::Front, at));
         let is_before = |front: i32| front < self.direction.end;
-        (is_before(low) || is_before(high)) && (is_middle || self.is_bent(job, table, station))
+        is_before(low) || is_before(high)
     }
 
     /// Passes over places at which no crest is to be measured. Whether it came to one where it is.
@@ -93,10 +92,10 @@ impl Advance {
         table: &mut Table<W>,
     ) -> bool {
         for _ in 0..CHUNK {
-            if self.search.next > 0 || self.has_crest(job, table, self.station) {
+            if self.search.next > 0 || self.has_crest(table, self.station) {
                 return true;
             }
-            self.end_crest(table);
+            self.end_crest(job, table);
             if self.task != Task::Crest {
                 break;
             }
@@ -128,14 +127,18 @@ impl Advance {
             excess
         };
         self.note_excess(table, self.mark_of(self.station), excess);
-        self.end_crest(table);
+        self.end_crest(job, table);
     }
 
-    /// Goes on to the next place.
-    fn end_crest<W: DerefMut<Target = [i32]>>(&mut self, table: &mut Table<W>) {
+    /// Goes on to the next place: from the middle of an interval that is not bent to the next one.
+    fn end_crest<W: DerefMut<Target = [i32]>>(&mut self, job: &Job<'_>, table: &mut Table<W>) {
         let places = PLACES * self.stations.count().saturating_sub(1);
+        let station = self.mark_of(self.station);
+        let is_middle = self.station < places && self.station.is_multiple_of(PLACES);
+        if is_middle && (table.word(Column::Mark, station) & 1 == 0 || !self.is_bent(job, table, station)) {
+            self.station += PLACES - 1;
+        }
         let number = self.station;
-        let station = self.mark_of(number);
         let bit = if number < places { 1 } else { 2 };
         if number >= places || (number + 1).is_multiple_of(PLACES) {
             let mark = table.word(Column::Mark, station);
