@@ -440,6 +440,11 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         36,
         "pieces of the planning of a period: PIECES_MAX",
     ),
+    (
+        "interp_core::pass::front::advance::measuring::finds_crest",
+        16,
+        "places that are passed over: CHUNK",
+    ),
     ("interp_core::feed::newton::rows::Place::rows", 3, "axes"),
     ("interp_core::feed::plan::motion::MotionAt::each_axis", 3, "axes"),
     (
