@@ -311,11 +311,6 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "powers of two of a span's parts",
     ),
     (
-        "interp_core::pass::front::advance::measuring::has_crest",
-        16,
-        "places that are passed over: CHUNK",
-    ),
-    (
         "interp_core::pass::front::advance::stepping::is_near",
         18,
         "stations beside one: 2 REACH + 1",
