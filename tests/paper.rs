@@ -314,8 +314,6 @@ const LENGTHS: [(&str, f64, Option<f64>); 5] = [
 ];
 /// Least mean crest, over the limit: of all curved paths.
 const MEAN_LEAST: f64 = 0.95;
-/// Curved paths above the limit, and by how much at most: see docs/limits.md.
-const ABOVE: [(&str, &str, f64); 1] = [("revolved", "constant, edge", 0.012)];
 
 #[test]
 fn passes_of_constant_scallop_height_are_shorter_and_hold_the_limit() {
@@ -336,11 +334,7 @@ fn passes_of_constant_scallop_height_are_shorter_and_hold_the_limit() {
             .fold(f64::INFINITY, f64::min);
         assert!(better <= *most, "{name}: {better}");
         for row in curved {
-            let above = ABOVE
-                .iter()
-                .find(|above| above.0 == *name && above.1 == row.name());
-            let allowed = above.map_or(0.0, |above| above.2);
-            assert!(row.crest_max <= 1.0 + row.error + allowed, "{name}: {row:?}");
+            assert!(row.holds_the_limit(), "{name}: {row:?}");
             assert!(
                 row.crest_mean >= MEAN_LEAST && row.crest_mean < row.crest_max,
                 "{name}: {row:?}"
