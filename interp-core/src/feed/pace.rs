@@ -51,6 +51,10 @@ const ABOVE_SAME: f32 = 0.01;
 const LONG_STOP_S: f32 = 0.35;
 const LONG_STOP_SEARCHES: u8 = 2;
 
+/// Longest stop that the first searches try, as a multiple of the shortest, and their number: one that begins behind a place that leaves little ends earlier.
+const SHORT: f32 = 1.6;
+const SHORT_SEARCHES: u8 = 3;
+
 /// Change of the pace that is none.
 const SAME: f32 = 1e-6;
 
@@ -397,6 +401,9 @@ impl<C: Copy> Pace<C> {
         let shortest = Inertia::at(course, &from).shortest(goal - pace, self.period);
         let change = Change::new(rates, goal, shortest);
         let mut search = Search::new((from, rates), goal, latency, widest, change);
+        if self.wanted == 0.0 && self.failures < SHORT_SEARCHES {
+            search.limit(SHORT * shortest);
+        }
         if makes_profile {
             search.make_profile(course, profiles, [slot_s, finest]);
         }

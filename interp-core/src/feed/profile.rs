@@ -7,9 +7,10 @@
 use crate::math::number::Bounded;
 
 /// Segments of a profile: slots in a row of the same r''.
-const SEGMENTS: usize = 40;
+const SEGMENTS: usize = 64;
+const PART_OF_SEGMENTS: f32 = 1.0 / 64.0;
 /// Most slots of a segment, and of a profile.
-const SLOTS_A_SEGMENT: u8 = u8::MAX;
+const SLOTS_A_SEGMENT: u32 = 0xff;
 const SLOTS_MAX: u16 = 300;
 /// Most slots that a place moves on by at once.
 const SLOTS_A_STEP: u8 = 8;
@@ -21,9 +22,13 @@ const SAME: f32 = 0.08;
 /// a part of that difference, so that a segment can go on where the axes leave less.
 const COARSER: f32 = 2.5;
 const COARSEST: f32 = 0.6;
-/// The same where half, or three quarters of the segments are taken.
+/// The same where half, or three quarters of the segments are taken, or so many more than the share of the way to the goal.
 const COARSE: [f32; 2] = [0.3, 0.6];
+const TAKEN: [f32; 2] = [0.5, 0.75];
+const TAKEN_BEYOND: [f32; 2] = [0.1, 0.3];
 const LESS: f32 = 0.5;
+/// Difference of two paces that is none.
+const SAME_PACE: f32 = 1e-6;
 /// Pace below 0 that is rounding.
 const PACE_MIN: f32 = -1e-5;
 /// Greatest r'', as a multiple of one over the square of a slot.
@@ -137,12 +142,29 @@ pub(crate) struct SlotAt {
     pub(crate) around: f32,
 }
 
+/// Slots in a row of the same r'': the bits of r'', 1/s^2, but for the last eight, which count the slots.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Segment(u32);
+
+impl Segment {
+    /// r'' as a segment has it.
+    const fn short(second: f32) -> f32 {
+        f32::from_bits(second.to_bits() & !SLOTS_A_SEGMENT)
+    }
+
+    const fn second(self) -> f32 {
+        f32::from_bits(self.0 & !SLOTS_A_SEGMENT)
+    }
+
+    const fn slots(self) -> u32 {
+        self.0 & SLOTS_A_SEGMENT
+    }
+}
+
 /// A change of the pace.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Profile {
-    /// r'' of each segment, 1/s^2, and its slots.
-    second: [f32; SEGMENTS],
-    slots: [u8; SEGMENTS],
+    segments: [Segment; SEGMENTS],
     count: u8,
     /// Duration of a slot, s.
     slot_s: f32,
@@ -155,8 +177,7 @@ pub(crate) struct Profile {
 
 impl Profile {
     pub(crate) const NONE: Self = Self {
-        second: [0.0; SEGMENTS],
-        slots: [0; SEGMENTS],
+        segments: [Segment(0); SEGMENTS],
         count: 0,
         slot_s: 1.0,
         start: [0.0; 2],
@@ -188,44 +209,46 @@ impl Profile {
     /// r'' of the last segment.
     fn last(&self) -> f32 {
         let index = usize::from(self.count).wrapping_sub(1);
-        self.second.get(index).copied().unwrap_or(0.0)
+        self.segments.get(index).map_or(0.0, |segment| segment.second())
     }
 
-    /// Least difference of r'' for which a segment goes on: greater where few segments are left.
-    const fn least_same(&self) -> f32 {
-        let [half, most] = COARSE;
-        match self.count as usize * 4 / SEGMENTS {
-            0..2 => 0.0,
-            2 => half,
-            _ => most,
+    /// Least difference of r'' for which a segment goes on at this pace: greater where few segments are left, or fewer than the way to the goal.
+    fn least_same(&self, pace: f32) -> f32 {
+        let [start, _] = self.start;
+        let taken = f32::from(self.count) * PART_OF_SEGMENTS;
+        let way = 1.0 - (pace - self.goal).abs() / (start - self.goal).abs().at_least(SAME_PACE);
+        let [half, most] = [0, 1].map(|of| taken >= TAKEN[of] || taken - way > TAKEN_BEYOND[of]);
+        match (half, most) {
+            (_, true) => COARSE[1],
+            (true, _) => COARSE[0],
+            _ => 0.0,
         }
     }
 
-    /// Appends a slot; returns whether there is room for it.
+    /// Appends a slot of an r'' as segments have it; returns whether there is room for it.
     fn push(&mut self, second: f32) -> bool {
         let index = usize::from(self.count).wrapping_sub(1);
-        if let Some(slots) = self.slots.get_mut(index)
-            && *slots < SLOTS_A_SEGMENT
-            && self.second.get(index) == Some(&second)
+        if let Some(segment) = self.segments.get_mut(index)
+            && segment.slots() < SLOTS_A_SEGMENT
+            && segment.second() == second
         {
-            *slots += 1;
+            segment.0 += 1;
             return true;
         }
-        let index = usize::from(self.count);
-        match (self.second.get_mut(index), self.slots.get_mut(index)) {
-            (Some(to), Some(slots)) => {
-                (*to, *slots) = (second, 1);
+        match self.segments.get_mut(usize::from(self.count)) {
+            Some(segment) => {
+                *segment = Segment(second.to_bits() | 1);
                 self.count += 1;
                 true
             }
-            _ => false,
+            None => false,
         }
     }
 
     /// r'' in the slot of a place; none in the parabola.
     fn second_at(&self, place: &ProfilePlace) -> Option<f32> {
-        let second = self.second.get(usize::from(place.segment))?;
-        (place.segment < self.count).then_some(*second)
+        let segment = self.segments.get(usize::from(place.segment))?;
+        (place.segment < self.count).then_some(segment.second())
     }
 }
 
@@ -298,8 +321,8 @@ impl ProfilePlace {
             self.rates = after(self.rates, second, profile.slot_s);
             self.since -= profile.slot_s;
             self.slot += 1;
-            let slots = profile.slots.get(usize::from(self.segment)).copied().unwrap_or(0);
-            if self.slot >= slots {
+            let segment = profile.segments.get(usize::from(self.segment));
+            if u32::from(self.slot) >= segment.map_or(0, |segment| segment.slots()) {
                 (self.segment, self.slot) = (self.segment + 1, 0);
             }
         }
@@ -422,17 +445,18 @@ impl Making {
             profile.end_s = end_s;
             return Slot::Complete;
         }
-        let same = self.same.at_least(profile.least_same());
+        let same = self.same.at_least(profile.least_same(r));
         let Some(second) = self.choose(&span, [left, first], last, [slot_s, same]) else {
             return self.try_again(profile);
         };
-        let rates = after(self.rates, sign * second, slot_s);
+        let second = Segment::short(sign * second);
+        let rates = after(self.rates, second, slot_s);
         let [pace, _] = rates;
         self.slots += 1;
         if self.slots > SLOTS_MAX || !(PACE_MIN..=most).contains(&pace) {
             return self.try_again(profile);
         }
-        if !profile.push(sign * second) {
+        if !profile.push(second) {
             self.same = (COARSER * self.same).at_most(COARSEST);
             return self.try_again(profile);
         }

@@ -183,6 +183,8 @@ pub(super) struct Search<C> {
     /// Periods until then.
     pub(super) left: u16,
     trial: u8,
+    /// Longest duration that is tried, s.
+    longest: f32,
     /// Greatest time between the places of a trial, s.
     widest: f32,
     pub(super) change: Change,
@@ -212,6 +214,7 @@ impl<C: Copy> Search<C> {
             goal,
             left,
             trial: 0,
+            longest: f32::MAX,
             widest,
             change,
             making: None,
@@ -227,6 +230,11 @@ impl<C: Copy> Search<C> {
     pub(super) fn relocated(self, of: impl Fn(&C) -> Option<C>) -> Option<Self> {
         let (from, at) = (of(&self.from)?, of(&self.at)?);
         Some(Self { from, at, ..self })
+    }
+
+    /// Tries nothing longer than this, s.
+    pub(super) const fn limit(&mut self, longest: f32) {
+        self.longest = longest;
     }
 
     /// Makes a profile of slots of this duration, or as short as the finest, s, before quintics are tried.
@@ -341,6 +349,6 @@ impl<C: Copy> Search<C> {
         }
         let longer = self.change.duration() * ratio.at_least(RATIO_MIN).at_most(RATIO_MAX);
         self.change = Change::new(self.rates, self.goal, longer);
-        self.trial < TRIALS
+        self.trial < TRIALS && longer <= self.longest
     }
 }

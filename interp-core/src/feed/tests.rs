@@ -564,9 +564,9 @@ fn commands_at_any_time_keep_the_limits() {
         at(0.9),
         at(1.0)
     );
-    // The jerk steps from node to node: a difference over one period may see a step that no place of the search did.
+    // The jerk steps from node to node and from slot to slot: a difference over one period may see a step that no place of the search did.
     assert!(
-        worst[0] <= 1.0001 && worst[1] <= 1.0 && worst[2] <= 1.05 && long <= 1.02,
+        worst[0] <= 1.0001 && worst[1] <= 1.0 && worst[2] <= 1.03 && long <= 1.0,
         "{worst:?} {long}"
     );
     assert!(at(0.9) <= 0.25 && at(1.0) <= 0.4, "{} {}", at(0.9), at(1.0));

@@ -9,8 +9,10 @@ use crate::feed::to_q10;
 use crate::math::arith::sqrt;
 use crate::math::number::Bounded;
 
-/// Distance from a jump within which a period may see it, periods.
+/// Distance from a jump within which a period may see it, periods; from the end of what a place stands for, where it stands for some time around it: the
+/// jerk of a period is a mean over three.
 const JUMP_REACH: f32 = 1.2;
+const JUMP_BEYOND: f32 = 0.8;
 
 /// Intervals before a place from which a jump near it is sought, and places that are looked at.
 const KNOT_NEAR: u16 = 2;
@@ -132,7 +134,7 @@ impl Plan {
         let since = self.stations.since(cell, arc_q10);
         let part = (since / length.at_least(1e-7)).at_least(0.0).at_most(1.0);
         let q = self.stations.blend(cell, part);
-        let near = (JUMP_REACH * limits.period).at_least(around) * v * r;
+        let near = (JUMP_REACH * limits.period).at_least(around + JUMP_BEYOND * limits.period) * v * r;
         let jump = if since <= near && cell > 0 && self.stations.is_jump(cell - 1) {
             Some(cell - 1)
         } else if length - since <= near && self.stations.is_jump(cell + 1) {
