@@ -22,11 +22,11 @@ const SAME: f32 = 0.08;
 /// a part of that difference, so that a segment can go on where the axes leave less.
 const COARSER: f32 = 2.5;
 const COARSEST: f32 = 0.6;
-/// The same where half, or three quarters of the segments are taken, or so many more than the share of the way to the goal.
-const COARSE: [f32; 2] = [0.3, 0.6];
+const LESS: f32 = 0.5;
+/// The same where half of the segments are taken, or so many more than the share of the way to the goal; and where it is the most.
+const COARSE: f32 = 0.3;
 const TAKEN: [f32; 2] = [0.5, 0.75];
 const TAKEN_BEYOND: [f32; 2] = [0.1, 0.3];
-const LESS: f32 = 0.5;
 /// Difference of two paces that is none.
 const SAME_PACE: f32 = 1e-6;
 /// Pace below 0 that is rounding.
@@ -217,11 +217,13 @@ impl Profile {
         let [start, _] = self.start;
         let taken = f32::from(self.count) * PART_OF_SEGMENTS;
         let way = 1.0 - (pace - self.goal).abs() / (start - self.goal).abs().at_least(SAME_PACE);
-        let [half, most] = [0, 1].map(|of| taken >= TAKEN[of] || taken - way > TAKEN_BEYOND[of]);
-        match (half, most) {
-            (_, true) => COARSE[1],
-            (true, _) => COARSE[0],
-            _ => 0.0,
+        let ([half, most], [half_beyond, most_beyond]) = (TAKEN, TAKEN_BEYOND);
+        if taken >= most || taken - way > most_beyond {
+            COARSEST
+        } else if taken >= half || taken - way > half_beyond {
+            COARSE
+        } else {
+            0.0
         }
     }
 
