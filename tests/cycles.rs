@@ -486,7 +486,7 @@ fn no_stage_has_grown() {
             assert!(figure.max < PERIOD_CYCLES / 10, "{figure:?}");
         }
         let ticks = all.iter().filter(|figure| figure.stage == figures::TICK);
-        for figure in ticks.filter(|figure| figure.surface.starts_with("constant height")) {
+        for figure in ticks {
             assert!(figure.period_share_pct() <= TICK_SHARE_MAX_PCT, "{figure:?}");
         }
         let planning = all.iter().filter(|figure| figure.stage == figures::PLANNING);

@@ -338,6 +338,9 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
     /// Executes one period.
     #[inline]
     fn step(&mut self, was_under_way: bool, lines: InputLines, events: &mut impl Events) {
+        if self.control.over.is_some() {
+            self.control.report_over(events);
+        }
         if !was_under_way && self.control.manual.is_active() {
             self.move_manually(lines);
         }
@@ -387,17 +390,15 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         }
     }
 
-    /// The first sample of a pass: reports the pass before it, and the room for further words of a streamed job.
+    /// The first sample of a pass: reports the pass before it, in the next tick unless samples are reported, and the room for further words of a streamed job.
     #[cold]
     #[inline(never)]
     fn begin_pass(&mut self, events: &mut impl Events) {
         let sample = *self.interpolator.last();
-        if let Some(over) = self
-            .control
-            .run
-            .begin_pass(&sample, self.interpolator.last_interval())
-        {
-            self.control.put(Event::Pass(over), events);
+        let interval = self.interpolator.last_interval();
+        self.control.over = self.control.run.begin_pass(&sample, interval);
+        if self.control.report == Report::Samples {
+            self.control.report_over(events);
         }
         let [_, room] = self.interpolator.load_room();
         if self.interpolator.is_streamed() && room != self.control.room {
@@ -429,9 +430,8 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
     #[inline(never)]
     fn end_run(&mut self, events: &mut impl Events) {
         let interval = self.interpolator.last_interval();
-        if let Some(over) = self.control.run.end_pass(interval) {
-            self.control.put(Event::Pass(over), events);
-        }
+        self.control.report_over(events);
+        self.control.over = self.control.run.end_pass(interval);
         self.control.credit = 0;
         self.control.spent = false;
         self.control.spindle.off();
@@ -442,6 +442,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
     #[cold]
     #[inline(never)]
     fn halt(&mut self, events: &mut impl Events) {
+        self.control.report_over(events);
         self.control.halts = self.control.halts.wrapping_add(1);
         let halted = Event::Halted(self.status_now());
         self.control.put(halted, events);

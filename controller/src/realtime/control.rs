@@ -5,7 +5,7 @@ use interp_core::{
     fault::{Fault, FaultKind},
     sample::Sample,
 };
-use protocol::message::{Clock, Report};
+use protocol::message::{Clock, PassDigest, Report};
 
 use super::{TickInput, moves, run::RunRecord};
 use crate::{
@@ -60,6 +60,8 @@ pub(super) struct Control {
     pub(super) has_drives: bool,
     /// Words of a streamed job up to which there was room, as last reported.
     pub(super) room: u32,
+    /// A pass that is over, until it is reported: the tick that begins the next one is the longest.
+    pub(super) over: Option<PassDigest>,
 }
 
 impl Control {
@@ -84,6 +86,7 @@ impl Control {
             pauses: false,
             has_drives: false,
             room: 0,
+            over: None,
         }
     }
 
@@ -91,6 +94,15 @@ impl Control {
     pub(super) fn put(&mut self, event: Event, events: &mut impl Events) {
         if !events.put(event) {
             self.run.events_lost = self.run.events_lost.saturating_add(1);
+        }
+    }
+
+    /// Reports the pass that is over, if it is not reported yet.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn report_over(&mut self, events: &mut impl Events) {
+        if let Some(over) = self.over.take() {
+            self.put(Event::Pass(over), events);
         }
     }
 

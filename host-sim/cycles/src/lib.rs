@@ -54,7 +54,7 @@ pub const TICKS_ON_CURVES: u32 = 8_000;
 /// Ticks of a job of constant scallop height with axis limits, or of one with a region: the first passes, and some links.
 pub const TICKS_ON_CURVES_WITHIN_LIMITS: u32 = 5_000;
 
-/// Greatest share of the period that a tick of a job of constant scallop height takes, in the pessimistic model, %.
+/// Greatest share of the period that a tick of a job of the table takes, in the pessimistic model, %.
 pub const TICK_SHARE_MAX_PCT: f64 = 3.0;
 
 /// Further jobs, of `tests/golden`, with their ticks: curved passes; step rates and limits, which are independent of the kind of surface.
