@@ -35,10 +35,12 @@ const STEPS_LEAST: u8 = 8;
 const LASTS_FIRST: f32 = 0.72;
 const LASTS: f32 = 0.9;
 const STEPS_SOME: u8 = 7;
-/// Periods that a step of the method takes for each node and apart from them, the check for each period of the plan, and what is left.
+/// Periods that a step of the method takes for each node and apart from them, the check for each period of the plan, and what is left. Before a turn, where a
+/// plan is given more time to spare, that is the time for a part of the check.
 const PERIODS_A_STEP: f32 = 0.27;
 const PERIODS_OF_STEP: f32 = 3.0;
-const PERIODS_A_PLACE: f32 = 0.07;
+const PERIODS_A_PLACE: f32 = 0.084;
+const PERIODS_A_PLACE_AT_SPEED: f32 = 0.07;
 const PERIODS_LEFT: f32 = 3.0;
 /// The same of the search for the last stop before an end at speed, with that stop.
 const PERIODS_OF_STOP: f32 = 400.0;
@@ -402,7 +404,12 @@ impl Planner {
             lasts - stop - to_f32(least)
         };
         let left = left.filter(|_| !is_between).unwrap_or(f32::MAX);
-        let left = own.at_most(left) - PERIODS_A_PLACE * lasts - PERIODS_LEFT;
+        let place = if is_between {
+            PERIODS_A_PLACE_AT_SPEED
+        } else {
+            PERIODS_A_PLACE
+        };
+        let left = own.at_most(left) - place * lasts - PERIODS_LEFT;
         let steps = (left.at_least(0.0) / self.periods_of_step(plan))
             .at_least(fewest)
             .at_most(most);

@@ -9,8 +9,7 @@ use crate::feed::to_q10;
 use crate::math::arith::sqrt;
 use crate::math::number::Bounded;
 
-/// Distance from a jump within which a period may see it, periods; from the end of what a place stands for, where it stands for some time around it: the
-/// jerk of a period is a mean over three.
+/// Distance from a jump within which a period may see it, periods; from the end of a slot of a profile: the jerk of a period is a mean over three.
 const JUMP_REACH: f32 = 1.2;
 const JUMP_BEYOND: f32 = 0.8;
 
@@ -31,7 +30,7 @@ impl Plan {
         around: f32,
     ) -> Use {
         let [r, r1, r2] = rates;
-        let here = self.motion_at(pace, limits, cursor, r, around);
+        let here = self.motion_at(pace, limits, cursor, r, [around; 2]);
         let v = here.v;
         let speed = v * r;
         let mut most = Use {
@@ -64,7 +63,8 @@ impl Plan {
             slot_s,
             around,
         } = *slot;
-        let here = self.motion_at(&self.pace, limits, cursor, r, around);
+        let sees = around + JUMP_BEYOND * limits.period;
+        let here = self.motion_at(&self.pace, limits, cursor, r, [around, sees]);
         // The speed changes over the time around the place.
         let [j, j_beside] = here.j;
         let fastest = fastest_around([here.v, here.a, j.abs().at_least(j_beside.abs())], r * around);
@@ -92,7 +92,7 @@ impl Plan {
         span
     }
 
-    /// The motion at a place, and at the pace r the jumps that a time around it sees.
+    /// The motion at a place that stands for some time around it, and at the pace r the jumps within another time.
     #[inline(always)]
     fn motion_at(
         &self,
@@ -100,7 +100,7 @@ impl Plan {
         limits: &MotionLimits,
         cursor: &Cursor,
         r: f32,
-        around: f32,
+        [around, sees]: [f32; 2],
     ) -> MotionAt {
         let interval = self.interval_of(pace, cursor.interval);
         let x = cursor.x.at_most(1.0);
@@ -134,7 +134,7 @@ impl Plan {
         let since = self.stations.since(cell, arc_q10);
         let part = (since / length.at_least(1e-7)).at_least(0.0).at_most(1.0);
         let q = self.stations.blend(cell, part);
-        let near = (JUMP_REACH * limits.period).at_least(around + JUMP_BEYOND * limits.period) * v * r;
+        let near = (JUMP_REACH * limits.period).at_least(sees) * v * r;
         let jump = if since <= near && cell > 0 && self.stations.is_jump(cell - 1) {
             Some(cell - 1)
         } else if length - since <= near && self.stations.is_jump(cell + 1) {

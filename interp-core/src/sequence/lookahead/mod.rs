@@ -119,6 +119,9 @@ pub(crate) struct Lookahead {
     patch_mm: f32,
     has_edge: bool,
     centre_mm: f32,
+    /// Whether the curvature jumped at a patch boundary of the last pass, and so far.
+    has_jump: bool,
+    jumps: bool,
     /// What is continuous if the direction of the tool centre's path is, at the end of the last patch: 1 - r k along the path, r times the twist;
     /// on a front 1 - r k across, too.
     bend: [f32; 3],
@@ -175,6 +178,8 @@ impl Lookahead {
         patch_mm: 0.0,
         has_edge: false,
         centre_mm: 0.0,
+        has_jump: false,
+        jumps: false,
         bend: [0.0; 3],
         is_smooth: false,
         speed: PathSpeed::STILL,
@@ -199,7 +204,7 @@ impl Lookahead {
     pub(crate) const fn restart(&mut self) {
         self.line = None;
         (self.patch_mm, self.pass_mm) = (0.0, 0.0);
-        self.has_edge = false;
+        (self.has_edge, self.has_jump) = (false, false);
         self.without = 0;
         self.whole = None;
         self.task = Task::Done;
@@ -259,7 +264,7 @@ impl Lookahead {
         out.pass = pass;
         out.route = route;
         out.cells = 0;
-        self.centre_mm = 0.0;
+        (self.centre_mm, self.jumps) = (0.0, false);
         (out.point, out.is_tip) = (false, false);
         out.full_pace = 1.0;
         out.next = None;
@@ -467,7 +472,7 @@ impl Lookahead {
         let patches = f32::from(self.patches.saturating_add(1));
         self.pass_mm = to_f32(self.start_q10 - out.head_q10) * MM_PER_Q10;
         self.patch_mm = (self.pass_mm / patches).at_least(self.centre_mm);
-        self.has_edge = self.centre_mm > 0.0;
+        (self.has_edge, self.has_jump) = (self.centre_mm > 0.0, self.jumps);
         let header = job.header;
         out.interval = interval_of(self.maximum.inv_interval_sq);
         if let Some(route) = lines.take(header) {

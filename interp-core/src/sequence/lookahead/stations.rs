@@ -23,6 +23,8 @@ pub(super) const LOOKS_MAX: u16 = 32;
 
 /// Cells between kept stations of a patch that are fine as they are.
 const CELLS_MANY: u16 = 8;
+/// Cells of a patch at least, where the curvature jumps at its ends.
+const CELLS_TO_REST: u16 = 4;
 
 /// Share of the centre's way that counts as length of a patch.
 const CENTRE_SHARE: f32 = 0.5;
@@ -79,6 +81,10 @@ impl Lookahead {
             if self.patch_mm == 0.0 || self.has_edge || self.centre_mm > 0.0 {
                 // The patches of a first pass are not known yet, and around an edge derivatives change within a patch.
                 out.cells = out.cells.max(CELLS_MANY.min(fit));
+            }
+            if self.has_jump {
+                // The walk rests at a jump only between two cells and more.
+                out.cells = out.cells.max(CELLS_TO_REST.min(fit));
             }
             if spans == 1 {
                 // A place between the rests.
@@ -279,6 +285,7 @@ impl Lookahead {
         if self.station == 0 {
             let apart = |(from, to): (&f32, &f32)| (to - from).abs() > NO_JUMP;
             self.is_smooth = self.patches > 0 && (self.may_join || !self.bend.iter().zip(&bend).any(apart));
+            self.jumps |= self.patches > 0 && !self.is_smooth;
         }
         self.bend = bend;
         self.speed = path;

@@ -19,6 +19,7 @@ pub(super) struct WholePass {
     patch_mm: f32,
     pass_mm: f32,
     has_edge: bool,
+    has_jump: bool,
 }
 
 impl Lookahead {
@@ -44,6 +45,7 @@ impl Lookahead {
             patch_mm: self.patch_mm,
             pass_mm: self.pass_mm,
             has_edge: self.has_edge,
+            has_jump: self.has_jump,
         });
         route.begin_at(path);
         self.begin(out.pass, route, &Turn::NONE, out);
@@ -55,7 +57,7 @@ impl Lookahead {
         self.whole = None;
         self.maximum = whole.maximum;
         (self.patch_mm, self.pass_mm) = (whole.patch_mm, whole.pass_mm);
-        self.has_edge = whole.has_edge;
+        (self.has_edge, self.has_jump) = (whole.has_edge, whole.has_jump);
         out.interval = whole.interval;
         (out.next, out.steps_over, out.is_last) = (whole.next, whole.steps_over, whole.is_last);
         self.finish_short(out);
