@@ -13,7 +13,8 @@ use machine::prepare::prepare;
 /// Relative growth of cycles that is accepted.
 pub const GROWTH_MAX: f64 = 0.02;
 
-/// Stages in which a report goes around the end of the ring of bytes to send, which bytes sent before the run decide; cycles that it takes, at most.
+/// Stages whose longest tick comes and goes from run to run by as many cycles as were seen, on a busy machine most: the code of the report at a change of pass. What takes
+/// them is not known. Their means have no such allowance.
 const REPORTS: [&str; 3] = ["everything else", TICK, TICK_AND_PULSES];
 const REPORT_CYCLES: f64 = 180.0;
 
