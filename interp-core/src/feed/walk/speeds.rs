@@ -12,9 +12,10 @@ use crate::math::number::{Bounded, cube_root};
 
 const FLAT: f32 = 1.0;
 
-/// Speed over a jump below which the walk rests there, as a share of the one that a ramp without constant acceleration reaches; nodes by which the rest is
-/// longer than the mean.
+/// Speed over a jump below which the walk rests there, as a share of the one that a ramp without constant acceleration reaches, and as a share of the one
+/// beside the jump: a rest costs more than a slow place. Nodes by which the rest is longer than the mean.
 const REST_BELOW: f32 = 0.5;
+const REST_BELOW_BESIDE: f32 = 0.1;
 const REST_NODES: f32 = 1.0;
 
 /// Stations on either side of a jump that the speed over it bounds.
@@ -73,8 +74,10 @@ impl Walker {
             .fold(f32::MAX, f32::at_most);
         let accel = [jump, jump + 1].map(|station| get(lists, ACCEL, station).abs());
         let accel = accel.into_iter().fold(f32::MAX, f32::at_most);
+        let square = [jump, jump + 1].map(|station| get(lists, SPEED_SQR, station));
+        let beside = sqrt(square.into_iter().fold(f32::MAX, f32::at_most));
         // Below this a rest is better: the walk's mean would not leave so narrow a slow place.
-        let rest_below = REST_BELOW * accel * accel / jerk;
+        let rest_below = (REST_BELOW * accel * accel / jerk).at_most(REST_BELOW_BESIDE * beside);
         let speed = if self.may_rest(plan, jump) && speed < rest_below {
             0.0
         } else {
