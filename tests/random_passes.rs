@@ -267,11 +267,24 @@ fn knots_where_the_curvature_jumps_are_passed_at_a_rest() {
         );
         assert!(used.feed <= 1.00001, "{seed}: {}", used.feed);
         for one in compare(kind, seed, &AtomicUsize::new(0)).unwrap() {
-            assert!(one.over_best < 1.6, "{}: {}", one.what, one.over_best);
+            assert!(one.over_best < 1.13, "{}: {}", one.what, one.over_best);
             measured += 1;
         }
     }
     assert!(measured >= 6, "{measured} passes");
+}
+
+/// Knots that the optimum passes at 0.7 of the feed and more: the tool rested there, which took 1.13 to 1.24 times the optimum.
+#[test]
+fn knots_that_can_be_passed_at_speed_are_no_rests() {
+    for (name, seed) in [("taper", 3), ("C2 knots", 11), ("C2 knots", 16)] {
+        let kind = KINDS.iter().position(|kind| *kind == name).unwrap();
+        let all = compare(kind, seed, &AtomicUsize::new(0)).unwrap();
+        assert_eq!(all.len(), 4, "{name} {seed}");
+        for one in all {
+            assert!(one.over_best < 1.052, "{}: {}", one.what, one.over_best);
+        }
+    }
 }
 
 /// 120 surfaces of five kinds, 5 to 60 mm, at 10 to 100 mm/s, within the limits of `jobs/plate_machine.toml` and three times as much. Prints
