@@ -28,10 +28,14 @@ fn fits(prepared: &Prepared) -> bool {
     Machine::load(prepared).is_ok_and(|mut machine| machine.run(|_| true).is_ok())
 }
 
+const fn campaign_state(seed: u64) -> u64 {
+    seed.wrapping_mul(0x1234_5678_9abc_def1)
+}
+
 /// Measures this surface of the campaign from one start, without axis limits or within them.
 fn add_case(seed: u64, start: Start, limits: Option<AxisLimits>, campaign: &mut Campaign) {
     let shape = SHAPES[seed as usize % SHAPES.len()];
-    let mut random = Random(seed.wrapping_mul(0x1234_5678_9abc_def1));
+    let mut random = Random(campaign_state(seed));
     let mut job = random_job(shape, &mut random);
     job.machine.limits = None;
     if !prepare(&job).is_ok_and(|straight| fits(&straight)) {
@@ -233,6 +237,34 @@ fn triangles_of(count: usize) -> Campaign {
 fn triangles() {
     let found = triangles_of(24);
     assert!(found.faults + found.above == 0 && found.held >= 8, "{found:?}");
+}
+
+/// Flat triangles, whose sides leave the passes' ends at 60 degrees and more from the right angle: fronts bend there by tens of degrees within one period at the feed. Contacts,
+/// normals and centres are checked, not the steps: three samples do not tell the way between them where it bends so much (`contact::tests` do).
+#[test]
+fn sharp_corners_of_triangles() {
+    for (seed, start) in [
+        (346, Start::Edge),
+        (346, Start::Middle),
+        (409, Start::Edge),
+        (409, Start::Middle),
+        (472, Start::Middle),
+        (528, Start::Middle),
+        (689, Start::Middle),
+        (731, Start::Edge),
+        (731, Start::Middle),
+    ] {
+        let mut job = random_job(Shape::Pole, &mut Random(campaign_state(seed)));
+        (job.spacing, job.machine.limits) = (Spacing::Constant(start), None);
+        let report = follow(&job).findings.report;
+        let mut failures = report.failures(&oracle::AccuracyBounds::default());
+        failures.retain(|failure| !failure.starts_with("feed ripple") && !failure.starts_with("last step"));
+        assert!(failures.is_empty(), "{seed} {start:?}: {failures:?}");
+        assert!(
+            report.complete && report.position_nm.max < 10.0,
+            "{seed} {start:?}"
+        );
+    }
 }
 
 #[test]

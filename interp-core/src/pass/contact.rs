@@ -9,6 +9,7 @@
 
 use crate::fault::{Fault, FaultKind, Result};
 use crate::math::arith::{fraction_from_f32, fraction_to_f32, small_step};
+use crate::math::number::Bounded;
 use crate::surface::PathSpeed;
 
 /// Maximum relative correction of the first-order step with which the series is used as a starting value. At 1/2 the
@@ -61,8 +62,10 @@ pub(crate) fn step(from: &PathSpeed, log_speed_derivative_before: f32, arc: f32)
 /// the arc, and 64 times that of its third. An exponential speed then changes by 8 % within the arc, with a relative error of 4e-8.
 const SMOOTH: f32 = 1.0 / 256.0;
 
-/// Maximum relative difference of the two-point and three-point rules for which the latter is accepted.
+/// Maximum relative difference of the two-point and three-point rules for which the latter is accepted: over a whole arc, and over a part of one, where the speed changes
+/// most. The error is a third of its power of 3/2: 1e-5.
 const APART: f32 = 1.0 / 128.0;
+const APART_IN_PART: f32 = 1.0 / 1024.0;
 
 /// Arc from a fraction of the patch to `length` beyond it, where the parametrisation is `end`: Hermite's two-point rule (error
 /// `length^5 s^(4) / 720` for a speed s), or of three (`length^7 s^(6) / 604800`). An error where both differ by more than the tolerance.
@@ -71,7 +74,7 @@ fn arc_over(
     from: u64,
     start: &PathSpeed,
     end: &PathSpeed,
-    length: f32,
+    (length, apart): (f32, f32),
 ) -> core::result::Result<f32, f32> {
     let (first, last) = (1.0 / start.inv_speed, 1.0 / end.inv_speed);
     let (rise, fall) = (
@@ -87,7 +90,7 @@ fn arc_over(
     let middle = path_at(from.saturating_add(fraction_from_f32(0.5 * length)));
     let three = sum * (7.0 / 30.0) + bow * (1.0 / 60.0) + 16.0 / 30.0 / middle.inv_speed;
     // A NaN is rejected too.
-    if (two - three).abs() <= APART * three {
+    if (two - three).abs() <= apart * three {
         Ok(length * three)
     } else {
         Err(length * three)
@@ -100,6 +103,55 @@ fn inverse_cubic(arc: f32, start: &PathSpeed, end: &PathSpeed, covered: f32, len
     let rest = 1.0 - part;
     let (first, last) = (covered * start.inv_speed, covered * end.inv_speed);
     part * (rest * rest * first + part * ((3.0 - 2.0 * part) * length - rest * last))
+}
+
+/// Arcs that may be too long until the step is a fault, and the first part of the arc of a period.
+const REFUSALS_MAX: u8 = 16;
+const FIRST_PART: f32 = 0.25;
+
+/// The parts of a period's arc where a front bends so sharply that the speed changes too much over all of it: half as long after one that is too long, twice as long after
+/// two others.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Parts {
+    length: f32,
+    refusals: u8,
+    /// The last part was not refused.
+    goes_on: bool,
+}
+
+impl Parts {
+    /// The whole arc at once.
+    pub(crate) const WHOLE: Self = Self {
+        length: f32::INFINITY,
+        refusals: 0,
+        goes_on: true,
+    };
+
+    /// The next part of what is left.
+    pub(crate) fn next(&self, rest: f32) -> f32 {
+        self.length.at_most(rest)
+    }
+
+    /// After an arc that is too long. False where too many were.
+    pub(crate) fn shorten(&mut self, length: f32) -> bool {
+        self.length = length * if self.refusals == 0 { FIRST_PART } else { 0.5 };
+        self.goes_on = false;
+        self.refusals += 1;
+        self.refusals <= REFUSALS_MAX
+    }
+
+    /// After an arc that was found.
+    pub(crate) fn lengthen(&mut self) {
+        if self.goes_on {
+            self.length *= 2.0;
+        }
+        self.goes_on = true;
+    }
+
+    /// Difference of the rules up to which an arc is accepted.
+    fn apart(&self) -> f32 {
+        if self.refusals > 0 { APART_IN_PART } else { APART }
+    }
 }
 
 /// End of an arc.
@@ -118,7 +170,7 @@ fn covered_to_end(
     patch_end: &impl Fn() -> Option<PathSpeed>,
     [from, limit]: [u64; 2],
     start: &PathSpeed,
-    room: f32,
+    room: (f32, f32),
 ) -> Result<(PathSpeed, core::result::Result<f32, f32>)> {
     let end = patch_end().unwrap_or_else(|| path_at(limit)).checked()?;
     let covered = arc_over(path_at, from, start, &end, room);
@@ -137,8 +189,9 @@ pub(crate) fn solve(
     [from, limit]: [u64; 2],
     start: &PathSpeed,
     patch_end: impl Fn() -> Option<PathSpeed>,
-    arc: f32,
+    (arc, parts): (f32, &Parts),
 ) -> Result<Reach> {
+    let apart = parts.apart();
     let room = fraction_to_f32(limit.saturating_sub(from));
     let first = arc * start.inv_speed;
     let bend = first * start.log_speed_derivative;
@@ -149,7 +202,7 @@ pub(crate) fn solve(
     let mut end = None;
     // The series holds for a small part of the patch: where the arc may cover all of it, the end is evaluated first.
     if first > LONG_STEP || guess >= room {
-        match covered_to_end(&mut path_at, &patch_end, [from, limit], start, room)? {
+        match covered_to_end(&mut path_at, &patch_end, [from, limit], start, (room, apart))? {
             (_, Ok(covered)) if covered <= arc => return Ok(Reach::Beyond(covered)),
             (speed, Ok(covered)) => end = Some((speed, covered)),
             (speed, Err(untrusted)) if guess >= room => return refused_at_end(&speed, untrusted),
@@ -166,7 +219,7 @@ pub(crate) fn solve(
     }
     for _ in 0..NEWTON_STEPS {
         let end = path_at(from.saturating_add(fraction_from_f32(guess))).checked()?;
-        let covered = arc_over(&mut path_at, from, start, &end, guess);
+        let covered = arc_over(&mut path_at, from, start, &end, (guess, apart));
         let (Ok(length) | Err(length)) = covered;
         let correction = path_of(arc - length, &end);
         // Not `>`, so that a NaN is rejected.
@@ -180,7 +233,7 @@ pub(crate) fn solve(
     }
     // The starting value was before the patch's end; the arc ends beyond it.
     if guess >= room && end.is_none() {
-        match covered_to_end(&mut path_at, &patch_end, [from, limit], start, room)? {
+        match covered_to_end(&mut path_at, &patch_end, [from, limit], start, (room, apart))? {
             (_, Ok(covered)) if covered <= arc => return Ok(Reach::Beyond(covered)),
             (_, Ok(_)) => {}
             (speed, Err(untrusted)) => return refused_at_end(&speed, untrusted),

@@ -17,7 +17,7 @@ use crate::job::Pattern;
 use crate::job::program::{Job, Program};
 use crate::math::arith::{advanced, fraction_from_f32, fraction_to_f32};
 use crate::pass::buffer::{self, PatchBuffer};
-use crate::pass::contact::{self, Reach};
+use crate::pass::contact::{self, Parts, Reach};
 use crate::pass::lines::{NextPass, RegionLines};
 use crate::pass::route::Route;
 use crate::pass::schedule;
@@ -38,8 +38,13 @@ const POLE_STEP: u64 = 1 << 60;
 /// Greatest correction of a step beyond a station, as a share of what is beyond it.
 const SHARE_MAX: f32 = 1.0 / 256.0;
 
-/// The same on passes of constant scallop height: the intervals of a front are two periods long, except on short passes, and the shortest passes are lines beside a point.
+/// The same on passes of constant scallop height: the intervals of a front are two periods long, except on short passes, and the shortest passes are lines beside a point. Within axis
+/// limits, and at the full feed in a sharp corner of the surface.
 const CROSSINGS_ON_FRONT_MAX: u8 = 4;
+const CROSSINGS_AT_FEED_MAX: u8 = 7;
+
+/// Arcs of a period at most: up to each boundary, and parts of it in sharp bends of a front.
+const ARCS_MAX: u8 = 32;
 
 /// A run: the travel and the patch buffer.
 #[derive(Clone, Copy, Debug)]
@@ -458,26 +463,41 @@ impl Run {
         if self.travel.is_at_start() && self.continues(&start, rest, feed_factor) {
             return Ok(());
         }
-        let most = if job.header.spacing.is_constant() {
-            CROSSINGS_ON_FRONT_MAX
-        } else {
-            CROSSINGS_MAX
+        let most = match (job.header.spacing.is_constant(), job.header.axes) {
+            (false, _) => CROSSINGS_MAX,
+            (true, Some(_)) => CROSSINGS_ON_FRONT_MAX,
+            (true, None) => CROSSINGS_AT_FEED_MAX,
         };
-        for crossings in 0..=CROSSINGS_ON_FRONT_MAX {
+        let (mut crossings, mut parts) = (0, Parts::WHOLE);
+        for _ in 0..ARCS_MAX {
             let Self { travel, buffer, .. } = self;
             let patch = buffer.patch();
-            let arc = rest * patch.per_mm;
+            let length = parts.next(rest);
+            let arc = length * patch.per_mm;
             let end = || Some(patch.end());
             let path_at = |fraction| patch.surface.path_at(fraction);
-            let covered =
-                match contact::solve(path_at, [travel.fraction, travel.piece.end()], &start, end, arc)? {
-                    Reach::Within(fraction) => {
-                        travel.fraction = fraction;
+            let range = [travel.fraction, travel.piece.end()];
+            let covered = match contact::solve(path_at, range, &start, end, (arc, &parts)) {
+                Ok(Reach::Within(fraction)) => {
+                    travel.fraction = fraction;
+                    if length >= rest {
                         return Ok(());
                     }
-                    Reach::Beyond(covered) => covered,
-                };
-            rest = (arc - covered) / patch.per_mm;
+                    start = path_at(fraction).checked()?;
+                    rest -= length;
+                    parts.lengthen();
+                    continue;
+                }
+                Ok(Reach::Beyond(covered)) => covered,
+                Err(fault) => {
+                    let is_too_long = fault.kind == FaultKind::ParameterBackwards;
+                    if is_too_long && travel.route.is_on_front() && parts.shorten(length) {
+                        continue;
+                    }
+                    return Err(fault);
+                }
+            };
+            rest = rest - length + (arc - covered) / patch.per_mm;
             let Self { travel, buffer, .. } = self;
             if buffer.next(job, &travel.route, &travel.piece).is_none() {
                 self.end_pass(job);
@@ -486,6 +506,7 @@ impl Run {
             if crossings == most {
                 break;
             }
+            crossings += 1;
             self.next_piece(job)?;
             start = self.buffer.patch().start().checked()?;
             if self.continues(&start, rest, feed_factor) {

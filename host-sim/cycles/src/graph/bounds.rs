@@ -68,6 +68,11 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "edges of a portion: TAKEN",
     ),
     (
+        "interp_core::pass::contact::solve",
+        32,
+        "arcs of a period: ARCS_MAX",
+    ),
+    (
         "interp_core::positioning::Periods::shortest",
         3,
         "whole numbers beside the best real one",
@@ -417,8 +422,8 @@ const BOUNDS: &[(&str, u32, &str)] = &[
     ),
     (
         "interp_core::pass::run::Run::step_far",
-        5,
-        "pieces of an arc: CROSSINGS_ON_FRONT_MAX + 1",
+        32,
+        "arcs of a period: ARCS_MAX",
     ),
     (
         "interp_core::surface::curve::CurvePass::take",

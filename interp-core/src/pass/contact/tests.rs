@@ -304,7 +304,7 @@ fn arc_error(line: &Curve, u: f64, length: f64) -> f64 {
     let (from, to) = (fraction(u), fraction(u).saturating_add(fraction(length)));
     let (start, end) = (surface.path_at(from), surface.path_at(to));
     let mut path_at = |fraction| surface.path_at(fraction);
-    let covered = arc_over(&mut path_at, from, &start, &end, length as f32).unwrap();
+    let covered = arc_over(&mut path_at, from, &start, &end, (length as f32, APART)).unwrap();
     f64::from(covered) / (arc_length(line, u, length) * per_mm) - 1.0
 }
 
@@ -368,7 +368,7 @@ fn solved(line: &Curve, u: f64, arc_mm: f64) -> Result<Reach> {
         [fraction(u), u64::MAX],
         &start,
         || None,
-        (arc_mm * per_mm) as f32,
+        ((arc_mm * per_mm) as f32, &Parts::WHOLE),
     )
 }
 
@@ -465,8 +465,77 @@ fn a_place_without_a_stretch_is_refused() {
             log_speed_derivative: start.log_speed_derivative * log_speed_derivative,
         };
         let path_at = |fraction| surface.path_at(fraction);
-        let fault = solve(path_at, [0, u64::MAX], &start, || None, (0.01 * per_mm) as f32).unwrap_err();
+        let arc = ((0.01 * per_mm) as f32, &Parts::WHOLE);
+        let fault = solve(path_at, [0, u64::MAX], &start, || None, arc).unwrap_err();
         assert_eq!(fault.kind, FaultKind::ParameterBackwards);
         assert!(fault.value.is_nan());
     }
+}
+
+/// A line that bends like a hyperbola around u = 0.5, within this width: its speed falls to 1 there.
+fn around_a_bend(width: f64, u: f64) -> PathSpeed {
+    let t = (u - 0.5) / width;
+    PathSpeed {
+        inv_speed: (1.0 / t.hypot(1.0)) as f32,
+        log_speed_derivative: (t / ((1.0 + t * t) * width)) as f32,
+    }
+}
+
+/// Its arc from the bend.
+fn arc_from_the_bend(width: f64, u: f64) -> f64 {
+    let t = (u - 0.5) / width;
+    0.5 * width * (t * t.hypot(1.0) + t.asinh())
+}
+
+/// Where an arc ends that is found in parts, if on the patch, and how much of it is.
+fn solved_in_parts(
+    path_at: impl Fn(u64) -> PathSpeed,
+    [from, limit]: [u64; 2],
+    arc: f64,
+) -> (Option<u64>, f64) {
+    let (mut at, mut rest, mut parts) = (from, arc as f32, Parts::WHOLE);
+    loop {
+        let length = parts.next(rest);
+        match solve(&path_at, [at, limit], &path_at(at), || None, (length, &parts)) {
+            Ok(Reach::Within(end)) if length >= rest => return (Some(end), arc),
+            Ok(Reach::Within(end)) => {
+                (at, rest) = (end, rest - length);
+                parts.lengthen();
+            }
+            Ok(Reach::Beyond(covered)) => return (None, arc - f64::from(rest) + f64::from(covered)),
+            Err(fault) => assert!(parts.shorten(length), "{fault:?}"),
+        }
+    }
+}
+
+/// Arcs over a bend that are too long for one quadrature, up to the patch's end and beyond.
+#[test]
+fn parts_of_an_arc_follow_a_sharp_bend() {
+    let mut in_parts = 0;
+    for width in [0.02, 0.05, 0.1] {
+        for from in [-3.0, -1.5, -0.8, -0.2] {
+            for share in [0.3, 0.9, 1.5, 2.5] {
+                let from = 0.5 + width * from;
+                let to = f64::min(0.5 + width * share, 0.99);
+                let arc = arc_from_the_bend(width, to) - arc_from_the_bend(width, from);
+                let path_at = |at: u64| around_a_bend(width, at as f64 / 2_f64.powi(64));
+                let start = path_at(fraction(from));
+                for (limit, is_within) in [(to + 1e-3, true), (to - 1e-3, false)] {
+                    let range = [fraction(from), fraction(limit)];
+                    let whole = (arc as f32, &Parts::WHOLE);
+                    if solve(path_at, range, &start, || None, whole).is_ok() {
+                        continue;
+                    }
+                    in_parts += 1;
+                    let (end, covered) = solved_in_parts(path_at, range, arc);
+                    assert_eq!(end.is_some(), is_within);
+                    let end = end.map_or(limit, |end| end as f64 / 2_f64.powi(64));
+                    let exact = arc_from_the_bend(width, end) - arc_from_the_bend(width, from);
+                    let error = (exact - covered) / arc;
+                    assert!(error.abs() < 1e-5, "{width} {from} {to}: {error:e}");
+                }
+            }
+        }
+    }
+    assert!(in_parts > 30, "{in_parts}");
 }

@@ -239,20 +239,13 @@ impl FootStep {
     /// both sides have the same: what lies next to the passes counts most.
     fn finish(&self, cap: i32) -> i32 {
         let [first, half, whole] = self.forms;
-        let means = [Form::mean(&[(first, 0.25), (half, 0.5), (whole, 0.25)])];
-        let mut base = self.base;
-        let mut least = STEP_MAX;
-        for mean in &means {
-            match mean.across(self.along, 1.0) {
-                Some(across) => least = across.at_most(least),
-                None => {
-                    // The foot is too far away: straight across.
-                    base = self.at;
-                    least = mean.across(0.0, 1.0).unwrap_or(STEP_MAX).at_most(least);
-                }
-            }
-        }
-        let step = to_f32(base.wrapping_sub(self.at)) * UNIT + least;
+        let mean = Form::mean(&[(first, 0.25), (half, 0.5), (whole, 0.25)]);
+        let from_foot = to_f32(self.base.wrapping_sub(self.at)) * UNIT;
+        let step = match mean.across(self.along, 1.0) {
+            Some(across) if from_foot + across > self.half => from_foot + across,
+            // The foot is too far away, near a pole, where the metric changes much on the way: straight across.
+            _ => mean.across(0.0, 1.0).unwrap_or(STEP_MAX).at_most(2.0 * self.half),
+        };
         let step = (step * self.share).at_least(0.0);
         self.at.saturating_add(to_units(step)).min(cap)
     }
