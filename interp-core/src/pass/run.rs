@@ -463,10 +463,12 @@ impl Run {
         if self.travel.is_at_start() && self.continues(&start, rest, feed_factor) {
             return Ok(());
         }
-        let most = match (job.header.spacing.is_constant(), job.header.axes) {
-            (false, _) => CROSSINGS_MAX,
-            (true, Some(_)) => CROSSINGS_ON_FRONT_MAX,
-            (true, None) => CROSSINGS_AT_FEED_MAX,
+        // Within axis limits the speed is low in a bend.
+        let may_bend = self.travel.route.is_on_front() && job.header.axes.is_none();
+        let most = match (job.header.spacing.is_constant(), may_bend) {
+            (_, true) => CROSSINGS_AT_FEED_MAX,
+            (true, false) => CROSSINGS_ON_FRONT_MAX,
+            (false, false) => CROSSINGS_MAX,
         };
         let (mut crossings, mut parts) = (0, Parts::WHOLE);
         for _ in 0..ARCS_MAX {
@@ -491,7 +493,7 @@ impl Run {
                 Ok(Reach::Beyond(covered)) => covered,
                 Err(fault) => {
                     let is_too_long = fault.kind == FaultKind::ParameterBackwards;
-                    if is_too_long && travel.route.is_on_front() && parts.shorten(length) {
+                    if is_too_long && may_bend && parts.shorten(length) {
                         continue;
                     }
                     return Err(fault);
