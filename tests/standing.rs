@@ -1,6 +1,8 @@
 //! The tool never stands in contact: neither at the ends of passes until the next one is planned, nor on them. Zigzag passes on the sample jobs, on
 //! random surfaces of 2 to 20 mm with jerk limits from 2 000 to 100 000 mm/s^3, and on a surface on which it stood.
 
+use std::path::Path;
+
 use inspect::plain;
 use job::{AxisLimits, Job, Pattern};
 use machine::Machine;
@@ -41,6 +43,39 @@ fn told(what: &str, stands: &[Stand]) -> String {
             stand.place.cause()
         )
     })
+}
+
+/// Passes of constant scallop height on a face of a part, with links that stay low: where the next front and its plan come late, the tool waits above the
+/// surface (0.1 to 0.8 s in contact before), and the first pass is as long as the face, no sliver at a corner of its region.
+#[test]
+fn neither_on_curved_passes_of_a_face_in_its_part() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../jobs/cad/blade.step");
+    for (face, side, first_s) in [(13, "+", 1.0), (7, "+", 0.1)] {
+        let text = format!(
+            "[surface]\nkind = \"file\"\npath = {path:?}\nface = {face}\nparameters = \"edges\"\n[part]\npath = {path:?}\n\
+             [tool]\nkind = \"ball\"\nradius_mm = 3\n[cut]\nfeed_mm_min = 1200\nscallop_mm = 0.01\nalong = \"u\"\nside = \"{side}\"\n\
+             pattern = \"zigzag\"\nspacing = \"constant\"\nstart = \"edge\"\n[machine]\nvelocity_max_mm_s = [100, 100, 50]\n\
+             acceleration_max_mm_s2 = [1000, 1000, 500]\njerk_max_mm_s3 = [20000, 20000, 10000]\n"
+        );
+        let job = job_file::parse_with("face.toml", &text, &part::Faces).unwrap();
+        let (job, prepared) = machine::direction::choose(job).ok().unwrap();
+        let mut machine = Machine::load(&prepared).unwrap();
+        let mut meter = TimeMeter::new(job.machine.period_s(), job.feed_mm_s(), Some(10_000.0));
+        let mut first = 0_u32;
+        machine
+            .run(|sample| {
+                let plain = plain(&prepared, sample);
+                first += u32::from(plain.pass == 0 && plain.parameters.is_some());
+                meter.add(&plain);
+                true
+            })
+            .unwrap();
+        assert_eq!(told(&face.to_string(), &meter.finish().stands), "");
+        assert!(
+            f64::from(first) * job.machine.period_s() > first_s,
+            "{face}: {first}"
+        );
+    }
 }
 
 /// A random small surface at a random feed and random limits.

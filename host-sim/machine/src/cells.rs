@@ -68,7 +68,7 @@ const ON_BOUNDARY: f64 = 1e-9;
 
 /// The cells of a region that is made from a face, without ends on which the first or the last line would be a sliver.
 fn without_slivers(job: &Job, region: &Region, cells: Vec<Vec<Polygon>>) -> Vec<Vec<Polygon>> {
-    if job.origin.reach().is_none() || job.spacing.is_constant() {
+    if job.origin.reach().is_none() {
         return cells;
     }
     let surface = SurfaceEvaluator::new(&job.surface);

@@ -11,6 +11,8 @@ use crate::sequence::link::check_faces_up;
 use crate::sequence::lookahead::check_travel;
 use crate::sequence::sequencer::{FeedCommand, Phase, Planning, Sequencer, both};
 
+/// How far the tool rises from the end of a pass to wait for the planning of the next one, nm.
+const ABOVE_NM: i32 = 300_000;
 /// What counts as straight above, nm.
 const BESIDE_NM: u32 = 1_000;
 
@@ -33,6 +35,8 @@ pub(super) enum Goal {
     SafeHeight,
     /// The same, to wait there.
     Lift,
+    /// A little above the end of a pass, and back when the next one is planned.
+    Above,
     /// The place that a pause has led away from.
     Back,
 }
@@ -68,6 +72,9 @@ impl Sequencer {
 
     /// The traverse needs the stations of the next pass, the plunge its plan; or a fault there is reported.
     fn knows_goal(&self, leg: Leg) -> bool {
+        if self.goal == Goal::Above && leg == Leg::Plunge {
+            return self.knows_link() || self.pending.is_some();
+        }
         if self.goal != Goal::Pass || self.pending.is_some() {
             return true;
         }
@@ -102,11 +109,12 @@ impl Sequencer {
             Goal::Pass => next.ends[0],
             Goal::End => axes.end_nm.unwrap_or(axes.home_nm),
             Goal::SafeHeight | Goal::Lift => from,
-            Goal::Back => self.back.at,
+            Goal::Above | Goal::Back => self.back.at,
         };
         let link = match self.goal {
             Goal::Pass if self.on_surface => job.link_to(now.pass.wrapping_add(1), axes),
             Goal::Pass if is_above(&from, &[x, y, z]) => Link::Across(from[2]),
+            Goal::Above => Link::Across(z.saturating_add(ABOVE_NM).min(axes.safe_z_nm)),
             Goal::End if axes.end_nm.is_some() => Link::Across(axes.end_height_nm),
             _ => Link::Across(axes.safe_z_nm),
         };
@@ -128,7 +136,7 @@ impl Sequencer {
             check_faces_up(next.faces_up[0])?;
         }
         check_travel(axes, &to)?;
-        let comes_down = (is_approach || self.goal == Goal::Back) && leg == Leg::Plunge;
+        let comes_down = (is_approach || matches!(self.goal, Goal::Above | Goal::Back)) && leg == Leg::Plunge;
         let slow_mm = if is_approach && self.is_low {
             f32::MAX
         } else if comes_down {
@@ -165,7 +173,8 @@ impl Sequencer {
                 self.phase = Phase::Done;
             }
             (Leg::Retract, Goal::Lift) => self.phase = Phase::Lifted,
-            (Leg::Plunge, Goal::Back | Goal::Lift) => self.phase = self.back.phase,
+            (Leg::Plunge, Goal::Above | Goal::Back | Goal::Lift) => self.phase = self.back.phase,
+            (Leg::Retract, Goal::Above) => self.await_goal(Leg::Plunge),
             (Leg::Retract, _) => self.await_goal(Leg::Traverse),
             (Leg::Traverse, _) => self.await_goal(Leg::Plunge),
             (Leg::Plunge, Goal::Pass) => self.phase = Phase::Leg(Leg::Plunge),

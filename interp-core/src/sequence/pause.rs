@@ -44,7 +44,7 @@ impl Sequencer {
         };
         let is_leg = matches!(self.phase, Phase::Leg(_) | Phase::AwaitGoal(_));
         // On its way up or back it is to come back to where it was.
-        if !(is_leg && matches!(self.goal, Goal::Lift | Goal::Back)) {
+        if !(is_leg && matches!(self.goal, Goal::Above | Goal::Lift | Goal::Back)) {
             self.back = Return {
                 phase: self.phase,
                 goal: self.goal,
@@ -56,6 +56,19 @@ impl Sequencer {
         self.goal = Goal::Lift;
         self.await_goal(Leg::Retract);
         true
+    }
+
+    /// Rises from the end of a pass, to wait a little above it.
+    pub(super) fn rise(&mut self) {
+        if let Some(at) = self.at {
+            self.back = Return {
+                phase: Phase::Await,
+                goal: Goal::Pass,
+                at,
+            };
+            self.goal = Goal::Above;
+            self.await_goal(Leg::Retract);
+        }
     }
 
     /// Leads a tool that is lifted back to where it was, or on towards the goal that it had.

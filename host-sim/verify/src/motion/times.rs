@@ -16,6 +16,9 @@ const AT_FEED: f64 = 0.99;
 const STAND_MAX_S: f64 = 0.020;
 /// Stands in contact that are stored.
 const STANDS_MAX: usize = 1000;
+/// A link that goes straight up leaves the surface, which faces up: by at least this much, nm, and by at most this much aside.
+const LIFT_NM: i32 = 10_000;
+const ASIDE_NM: i32 = 1000;
 /// A link that comes this near to the highest point of the run, nm, is a retract: the safe height is above the whole surface.
 const SAFE_NM: i32 = 1000;
 
@@ -145,6 +148,8 @@ struct OpenLink {
     top_nm: i32,
     periods: u64,
     standing: u64,
+    /// It goes straight up.
+    lifts: bool,
 }
 
 /// Accumulates the times of a run, sample by sample.
@@ -216,6 +221,7 @@ impl TimeMeter {
                 top_nm: sample.cl_nm[2],
                 periods: 0,
                 standing: 0,
+                lifts: false,
             });
         }
         if let Some(link) = self.links.last_mut().filter(|_| !on_pass) {
@@ -223,6 +229,8 @@ impl TimeMeter {
             link.standing += u64::from(stands);
             link.top_nm = link.top_nm.max(sample.cl_nm[2]);
             link.last_nm = sample.cl_nm;
+            link.lifts |= aside_nm(sample.cl_nm, link.from_nm) <= ASIDE_NM.unsigned_abs()
+                && sample.cl_nm[2] - link.from_nm[2] > LIFT_NM;
         }
         let part = if stands {
             Some(STANDING_PART)
@@ -269,8 +277,15 @@ impl TimeMeter {
             return;
         };
         let time_s = self.seconds(place.periods);
-        // A stand on a link counts if the link turns out to be in contact.
-        if place.periods == 0 || (self.stands.len() >= STANDS_MAX && time_s <= self.longest()) {
+        // A stand on a link counts if the link turns out to be in contact; after a lift only where the link began, if it comes back there.
+        let link = place.link.filter(|_| !place.any_on_pass);
+        let lifted = link.map(|link| self.links[link]).filter(|link| link.lifts);
+        let is_off = lifted.is_some_and(|link| {
+            aside_nm(place.cl_nm, link.from_nm) > PLACE_NM.unsigned_abs()
+                || place.cl_nm[2] - link.from_nm[2] > PLACE_NM
+        });
+        let link = link.filter(|_| lifted.is_none());
+        if place.periods == 0 || is_off || (self.stands.len() >= STANDS_MAX && time_s <= self.longest()) {
             return;
         }
         let kind = match (place.first_on_pass, place.last_on_pass, place.any_on_pass) {
@@ -288,8 +303,7 @@ impl TimeMeter {
             place: kind,
         };
         if time_s > self.stand_max_s || time_s > self.longest() {
-            self.stands
-                .push((stand, place.link.filter(|_| !place.any_on_pass)));
+            self.stands.push((stand, link));
         }
     }
 
@@ -318,7 +332,7 @@ impl TimeMeter {
                 standing_s: self.seconds(link.standing),
                 ends_mm: [link.from_nm, link.last_nm].map(millimetres),
                 top_mm: f64::from(link.top_nm) * MM_PER_NM,
-                turn: !outer && link.top_nm < self.top_nm - SAFE_NM,
+                turn: !outer && !link.lifts && link.top_nm < self.top_nm - SAFE_NM,
             });
         }
         let moving = |turn: bool| -> f64 {
@@ -351,6 +365,11 @@ const MM_PER_NM: f64 = 1e-6;
 
 fn millimetres(nm: [i32; 3]) -> DVec3 {
     DVec3::from(nm.map(f64::from)) * MM_PER_NM
+}
+
+/// How far a place is from straight above another one, nm, along the farther axis.
+fn aside_nm([x, y, _]: [i32; 3], [other_x, other_y, _]: [i32; 3]) -> u32 {
+    x.abs_diff(other_x).max(y.abs_diff(other_y))
 }
 
 /// A sentence on the stands in contact, if there are any: number, the longest, its place and cause.
@@ -412,6 +431,23 @@ mod tests {
                 self.tick += 1;
             }
             self
+        }
+    }
+
+    /// A wait straight above the end of a pass is none in contact; one on the boundary is.
+    #[test]
+    fn a_wait_above_a_pass_is_not_in_contact() {
+        for (up_nm, stands) in [(300_000, 0), (0, 1)] {
+            let mut run = Run::new();
+            run.go(100, [0, 0, -400_000], -1, 0.0)
+                .go(100, [10_000, 0, 0], 0, 10.0)
+                .go(1, [0, 0, up_nm], -1, 0.0)
+                .go(100, [0; 3], -1, 0.0)
+                .go(1, [0, 0, -up_nm], -1, 0.0)
+                .go(30, [0, 4000, 0], -1, 0.0)
+                .go(100, [-10_000, 0, 0], 1, 10.0)
+                .go(50, [0, 0, 800_000], -2, 0.0);
+            assert_eq!(run.meter.finish().stands.len(), stands, "{up_nm}");
         }
     }
 

@@ -32,6 +32,9 @@ use next_step::NextStep;
 /// Least distance of a place within a pass from its ends, 0.5 mm, units of 2^-10 nm: the rest of the pass has cells of its own.
 const WITHIN_Q10: i64 = 500_000 << 10;
 
+/// Longest stand at the end of a pass, periods: for more the tool rises, which takes some ten times as long.
+const STAND_MAX: f32 = 15.0;
+
 /// Phase of the sequence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Phase {
@@ -350,6 +353,22 @@ impl Sequencer {
         self.planning == Planning::Complete
     }
 
+    /// Whether the tool can go on from the end of a pass.
+    pub(super) fn knows_link(&self) -> bool {
+        self.is_planned() && !self.has_to_plan_step_over() && !self.has_to_choose
+    }
+
+    /// Whether the tool would stand at the end of a pass for more than [`STAND_MAX`] periods, and can rise. A starved job stands: its time is not the job's.
+    fn waits_long(&self, job: &Job<'_>) -> bool {
+        let (now, next) = self.plans_ref();
+        let is_long = match self.planning {
+            Planning::Awaited(_) | Planning::Requested(_) | Planning::Stations => true,
+            Planning::Feed => self.planner.is_walking() || self.planner.least_left(&next.plan) > STAND_MAX,
+            Planning::AwaitsRows(_) | Planning::Complete => false,
+        };
+        is_long && self.on_surface && now.faces_up[1] && job.header.window == 0
+    }
+
     /// One period, into `last`. The phases off the passes are separate functions, so that a tick on a pass saves no registers for them.
     ///
     /// # Errors
@@ -418,7 +437,10 @@ impl Sequencer {
             if let Some(fault) = self.pending {
                 return Err(fault);
             }
-            if !self.is_planned() || self.has_to_plan_step_over() || self.has_to_choose {
+            if !self.knows_link() {
+                if self.waits_long(job) {
+                    self.rise();
+                }
                 return Ok(());
             }
             let (now, next) = both(&mut self.plans, self.second);

@@ -448,9 +448,9 @@ impl Sequencer {
                 } else {
                     0
                 };
-                let is_reached_on_surface = next.pass > self.first.pass
-                    && !job.header.spacing.is_constant()
-                    && (now.steps_over || job.link_to(next.pass, axes) == Link::Straight);
+                let is_joined = now.steps_over && !job.header.spacing.is_constant();
+                let is_reached_on_surface =
+                    next.pass > self.first.pass && (is_joined || job.link_to(next.pass, axes).is_low());
                 let left = is_reached_on_surface.then(|| {
                     let passed = if self.phase == Phase::Pass {
                         self.passed
