@@ -6,6 +6,7 @@ use interp_core::{
     AxisLimits, Command, Header, Inputs, Interpolator, Pattern, Sample, Spacing, SpanParameter, State,
 };
 use job::AxisLimits as JobLimits;
+use machine::links::Link;
 use machine::prepare::prepare;
 
 /// The core, with a store of the job's size.
@@ -173,6 +174,35 @@ impl Course {
         Self::new(&name, header, &words)
     }
 
+    /// Curved passes in a region of a small surface, reached straight: the first one is a sliver, and the tool rises from its end to wait for the second.
+    fn of_sliver() -> Self {
+        let text = "[surface]\nkind = \"nurbs\"\ndegree = [1, 1]\nknots_u = [0, 0, 1, 1]\nknots_v = [0, 0, 1, 1]\n\
+            poles_mm = [[[0, 0, 0], [0, 8, 1]], [[14, 0, 1], [14, 8, 0]]]\n\
+            [region]\nloops = [[[0.1, 0.1], [0.9, 0.11], [0.9, 0.8], [0.1, 0.8]]]\n\
+            [tool]\nkind = \"ball\"\nradius_mm = 2\n\
+            [cut]\nfeed_mm_min = 2400\nscallop_mm = 0.05\nalong = \"u\"\nside = \"up\"\npattern = \"zigzag\"\n\
+            spacing = \"constant\"\nstart = \"edge\"\n\
+            [machine]\nvelocity_max_mm_s = [100, 100, 50]\nacceleration_max_mm_s2 = [1000, 1000, 500]\n\
+            jerk_max_mm_s3 = [20000, 20000, 10000]\n";
+        let mut prepared = prepare(&job_file::parse("sliver.toml", text).unwrap()).unwrap();
+        machine::links::add(&mut prepared, &[Link::Straight; 100]);
+        let course = Self::new("sliver", prepared.header, &prepared.words);
+        let [x, y, z] = course.ends[0];
+        let waits = |start: &Start| {
+            let [at_x, at_y, at_z] = start.sample.cl_nm;
+            [at_x, at_y] == [x, y] && at_z > z + 200_000 && start.sample.feed_mm_s < 1.0
+        };
+        assert!(
+            course
+                .starts
+                .iter()
+                .skip_while(|start| start.sample.state != State::Running)
+                .any(waits),
+            "the tool rises"
+        );
+        course
+    }
+
     /// The jobs of the campaign: hops, step-overs, turns and curves, on a dome and on sample jobs with knots.
     #[must_use]
     pub fn all() -> Vec<Self> {
@@ -190,6 +220,7 @@ impl Course {
             Self::of_job("freeform", 3600.0, job::Pattern::Zigzag, 0.0),
             Self::of_job("plate_v", 3600.0, job::Pattern::Zigzag, 2.0),
             Self::of_job("sphere_cap", 3000.0, job::Pattern::Zig, 0.0),
+            Self::of_sliver(),
         ]
     }
 }
