@@ -55,6 +55,9 @@ const LONG_STOP_SEARCHES: u8 = 2;
 const SHORT: f32 = 1.6;
 const SHORT_SEARCHES: u8 = 3;
 
+/// Searches that find nothing from rest, after which the next plan comes first.
+const STUCK: u8 = 2;
+
 /// Change of the pace that is none.
 const SAME: f32 = 1e-6;
 
@@ -205,6 +208,11 @@ impl<C: Copy> Pace<C> {
     /// Moves the places of a search on; it ends where one of them cannot be.
     pub(crate) fn relocate(&mut self, of: impl Fn(&C) -> Option<C>) {
         self.search = self.search.and_then(|search| search.relocated(of));
+    }
+
+    /// Whether it stands and searches found no way on: with the place up to which the next plan is not needed just ahead, only that plan helps.
+    pub(crate) fn is_stuck(&self) -> bool {
+        self.failures >= STUCK && self.search.is_none() && !self.is_changing() && self.goal == 0.0
     }
 
     /// Whether a search begins with the next piece of work: its place is a good number of periods ahead.

@@ -93,6 +93,15 @@ impl Sequencer {
         self.has_step_over && !self.step_over.is_planned()
     }
 
+    /// Whether a change of the pace is sought before anything else is planned: not where the tool stands until the next pass is planned.
+    fn seeks_pace(&self) -> bool {
+        let is_planning = matches!(
+            self.planning,
+            Planning::Requested(..) | Planning::Stations | Planning::Feed
+        );
+        self.pace.has_work() && !(self.pace.is_stuck() && is_planning && self.pending.is_none())
+    }
+
     /// Whether the link to the next pass can be chosen, and has to be.
     fn may_choose(&self) -> bool {
         self.has_to_choose
@@ -133,7 +142,7 @@ impl Sequencer {
         match self.planning {
             Planning::Requested(..) | Planning::Stations | Planning::Feed => {
                 // Periods in which a change of the pace is sought are none of the planning's.
-                let is_searching = matches!(self.phase, Phase::Pass | Phase::Turn) && self.pace.has_work();
+                let is_searching = matches!(self.phase, Phase::Pass | Phase::Turn) && self.seeks_pace();
                 self.spent = self.spent.saturating_add(u32::from(!is_searching));
             }
             Planning::Complete => {
@@ -248,7 +257,7 @@ impl Sequencer {
     /// Cycles of the next piece apart from the next front; none where there is none, or the next front comes first.
     fn next_own_cycles(&self, run: &Run) -> Option<u32> {
         match self.phase {
-            Phase::Pass | Phase::Turn if self.pace.has_work() => {
+            Phase::Pass | Phase::Turn if self.seeks_pace() => {
                 return Some(if self.pace.begins_search() {
                     PACE_BEGIN_CYCLES
                 } else {
@@ -311,10 +320,10 @@ impl Sequencer {
             self.plan_leg(leg, job, axes);
             return true;
         }
-        let is_known = self.knows_next();
+        let (is_known, seeks_pace) = (self.knows_next(), self.seeks_pace());
         let (now, next) = both(&mut self.plans, self.second);
         match self.phase {
-            Phase::Pass | Phase::Turn if self.pace.has_work() => {
+            Phase::Pass | Phase::Turn if seeks_pace => {
                 let known = is_known.then_some(&next.plan);
                 let stops = self.pace.wanted() == 0.0;
                 let road = road(&now.plan, known, next.plan.pace_max, stops);
