@@ -53,7 +53,7 @@ const LONG_STOP_SEARCHES: u8 = 2;
 
 /// Longest stop that the first searches try, as a multiple of the shortest, and their number: one that begins behind a place that leaves little ends earlier.
 const SHORT: f32 = 1.6;
-const SHORT_SEARCHES: u8 = 3;
+const SHORT_SEARCHES: u8 = 5;
 
 /// Searches that find nothing from rest, after which the next plan comes first.
 const STUCK: u8 = 2;
