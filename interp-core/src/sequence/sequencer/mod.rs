@@ -358,16 +358,20 @@ impl Sequencer {
         self.is_planned() && !self.has_to_plan_step_over() && !self.has_to_choose
     }
 
-    /// Whether the tool would stand at the end of a pass for more than [`STAND_MAX`] periods, and can rise. For rows of a streamed job it stands: that
+    /// Whether the tool would stand at the end of a pass, before a low link, for more than [`STAND_MAX`] periods, and can rise. For rows of a streamed job it stands: that
     /// time is not the job's.
-    fn waits_long(&self) -> bool {
+    fn waits_long(&self, job: &Job<'_>) -> bool {
         let (now, next) = self.plans_ref();
         let is_long = match self.planning {
             Planning::Awaited(_) | Planning::Requested(_) | Planning::Stations => true,
             Planning::Feed => self.planner.is_walking() || self.planner.least_left(&next.plan) > STAND_MAX,
             Planning::AwaitsRows(_) | Planning::Complete => false,
         };
-        is_long && self.on_surface && now.faces_up[1]
+        let is_low = || {
+            let axes = job.header.axes.as_ref();
+            axes.is_some_and(|axes| job.link_to(now.pass.wrapping_add(1), axes).is_low())
+        };
+        is_long && self.on_surface && now.faces_up[1] && is_low()
     }
 
     /// One period, into `last`. The phases off the passes are separate functions, so that a tick on a pass saves no registers for them.
@@ -439,7 +443,7 @@ impl Sequencer {
                 return Err(fault);
             }
             if !self.knows_link() {
-                if self.waits_long() {
+                if self.waits_long(job) {
                     self.rise();
                 }
                 return Ok(());

@@ -15,6 +15,7 @@ use crate::pass::front::NextRoute;
 use crate::pass::run::Run;
 use crate::pass::scan::cycles::{NEXT, PATCH};
 use crate::sample::SpanParameter;
+use crate::sequence::legs::Goal;
 use crate::sequence::link::BoundaryEnd;
 use crate::sequence::lookahead::{PassPlan, has_turns};
 use crate::sequence::turning::road;
@@ -93,19 +94,26 @@ impl Sequencer {
         self.has_step_over && !self.step_over.is_planned()
     }
 
-    /// Whether a change of the pace is sought before anything else is planned: not where the tool stands until the next pass is planned.
+    /// Whether a change of the pace is sought before anything else is planned.
+    #[inline(always)]
     fn seeks_pace(&self) -> bool {
+        self.pace.has_work() && !self.waits_for_plan()
+    }
+
+    /// Whether the tool stands until the next pass is planned.
+    #[inline(never)]
+    fn waits_for_plan(&self) -> bool {
         let is_planning = matches!(
             self.planning,
             Planning::Requested(..) | Planning::Stations | Planning::Feed
         );
-        self.pace.has_work() && !(self.pace.is_stuck() && is_planning && self.pending.is_none())
+        is_planning && self.pace.is_stuck() && self.pending.is_none()
     }
 
     /// Whether the link to the next pass can be chosen, and has to be.
     fn may_choose(&self) -> bool {
         self.has_to_choose
-            && matches!(self.phase, Phase::Pass | Phase::Await)
+            && (matches!(self.phase, Phase::Pass | Phase::Await) || self.goal == Goal::Above)
             && matches!(self.planning, Planning::Feed | Planning::Complete)
     }
 
@@ -320,7 +328,8 @@ impl Sequencer {
             self.plan_leg(leg, job, axes);
             return true;
         }
-        let (is_known, seeks_pace) = (self.knows_next(), self.seeks_pace());
+        let is_known = self.knows_next();
+        let seeks_pace = matches!(self.phase, Phase::Pass | Phase::Turn) && self.seeks_pace();
         let (now, next) = both(&mut self.plans, self.second);
         match self.phase {
             Phase::Pass | Phase::Turn if seeks_pace => {
@@ -458,8 +467,8 @@ impl Sequencer {
                     0
                 };
                 let is_joined = now.steps_over && !job.header.spacing.is_constant();
-                let is_reached_on_surface =
-                    next.pass > self.first.pass && (is_joined || job.link_to(next.pass, axes).is_low());
+                let is_low = || job.header.links > 0 && job.link_to(next.pass, axes).is_low();
+                let is_reached_on_surface = next.pass > self.first.pass && (is_joined || is_low());
                 let left = is_reached_on_surface.then(|| {
                     let passed = if self.phase == Phase::Pass {
                         self.passed
