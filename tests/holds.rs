@@ -231,3 +231,13 @@ fn a_fault_stops_within_three_tenths_of_a_second() {
         }
     }
 }
+
+/// Before a turn the tool cannot go on until the next pass is planned: that planning comes before the search for a pace, with which it stood for 1.3 s and more at
+/// each of these feeds, after one of a thousand resumes.
+#[test]
+fn each_of_a_thousand_resumes_moves() {
+    for feed in [5900.0, 5940.0, 6040.0, 6060.0] {
+        let Holds { on_pass, in_link } = holds("freeform", feed, Pattern::Zigzag, 2.0, 1000);
+        assert_eq!(on_pass.len() + in_link.len(), 1000);
+    }
+}

@@ -34,7 +34,7 @@ pub fn read(path: &Path) -> Result<Model, CadError> {
     read_bytes(&file, &ending, bytes)
 }
 
-/// Reads the bytes of a file. `file`: its name in errors; `ending`: its extension, lower case, of which a different format is told.
+/// Reads the bytes of a file. `file`: its name in errors; `ending`: its extension, lower case, named in the warning where the format is another one.
 ///
 /// # Errors
 /// As [`read`].
