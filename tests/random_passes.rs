@@ -287,6 +287,17 @@ fn knots_that_can_be_passed_at_speed_are_no_rests() {
     }
 }
 
+/// The tool waits for the plan of the first pass off the surface, so that has all the nodes and steps that it is worth: it took 1.24 times the optimum.
+#[test]
+fn the_first_pass_is_planned_as_well_as_can_be() {
+    let kind = KINDS.iter().position(|kind| *kind == "C1 knots").unwrap();
+    let all = compare(kind, 42, &AtomicUsize::new(0)).unwrap();
+    assert_eq!(all.len(), 4);
+    for one in all {
+        assert!(one.over_best < 1.06, "{}: {}", one.what, one.over_best);
+    }
+}
+
 /// 120 surfaces of five kinds, 5 to 60 mm, at 10 to 100 mm/s, within the limits of `jobs/plate_machine.toml` and three times as much. Prints
 /// each pass and the table behind `docs/figures.md`, in a quarter of an hour; ISOFEED_CASES sets another number of surfaces of each
 /// kind, ISOFEED_FIRST leaves out those before it:

@@ -9,3 +9,11 @@ fn no_sequence_of_commands_breaks_a_limit() {
     println!("{outcome:?}");
     assert_eq!((outcome.count, errors), (400, Vec::<String>::new()));
 }
+
+/// Where the plan is near the feed, the tool moves at exactly that: a slower pace that relied on the plan's own jerk used 1.026 of the limit.
+#[test]
+fn a_slower_pace_from_the_feed() {
+    let course = Course::of_region(1, "[[0.1, 0.1], [0.9, 0.11], [0.9, 0.8], [0.1, 0.8]]");
+    let outcome = course.pause_at_each_place().unwrap();
+    assert!(outcome.count > 100, "{}", outcome.count);
+}

@@ -115,10 +115,11 @@ fn never_in_contact_on_random_small_surfaces() {
     assert!(failed.is_empty(), "{failed}");
 }
 
-/// Surfaces that campaigns found: passes over jumps of the curvature with one cell a patch crept for minutes (142); plans were complete 25 to 49 ms late.
+/// Surfaces that campaigns found: passes over jumps of the curvature with one cell a patch crept for minutes (142); plans were complete 25 to 49 ms late; the
+/// method ended with a pass of 21 s, because its check would take long, and so it was late (527).
 #[test]
 fn never_where_campaigns_found_it() {
-    for number in [112, 142, 1361, 2143] {
+    for number in [112, 142, 527, 1361, 2143] {
         let times = times(&small(number)).unwrap();
         assert_eq!(told(&number.to_string(), &times.stands), "");
         assert!(times.whole_s < 60.0, "{number}: {} s", times.whole_s);

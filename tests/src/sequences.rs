@@ -174,23 +174,44 @@ impl Course {
         Self::new(&name, header, &words)
     }
 
-    /// Curved passes in a region of a small surface, reached straight: the first one is a sliver, and the tool rises from its end to wait for the second.
-    fn of_sliver() -> Self {
-        let text = "[surface]\nkind = \"nurbs\"\ndegree = [1, 1]\nknots_u = [0, 0, 1, 1]\nknots_v = [0, 0, 1, 1]\n\
-            poles_mm = [[[0, 0, 0], [0, 8, 1]], [[14, 0, 1], [14, 8, 0]]]\n\
-            [region]\nloops = [[[0.1, 0.1], [0.9, 0.11], [0.9, 0.8], [0.1, 0.8]]]\n\
+    /// Curved passes in a region of a twisted surface of so many patches along them, reached straight.
+    #[must_use]
+    pub fn of_region(patches: u32, region: &str) -> Self {
+        let inner: Vec<f64> = (0..=patches)
+            .map(|knot| f64::from(knot) / f64::from(patches))
+            .collect();
+        let knots = [&[0.0], &inner[..], &[1.0]].concat();
+        let poles: Vec<[[f64; 3]; 2]> = inner
+            .iter()
+            .map(|u| [[14.0 * u, 0.0, *u], [14.0 * u, 8.0, 1.0 - u]])
+            .collect();
+        let text = format!(
+            "[surface]\nkind = \"nurbs\"\ndegree = [1, 1]\nknots_u = {knots:?}\nknots_v = [0, 0, 1, 1]\n\
+            poles_mm = {poles:?}\n\
+            [region]\nloops = [{region}]\n\
             [tool]\nkind = \"ball\"\nradius_mm = 2\n\
             [cut]\nfeed_mm_min = 2400\nscallop_mm = 0.05\nalong = \"u\"\nside = \"up\"\npattern = \"zigzag\"\n\
             spacing = \"constant\"\nstart = \"edge\"\n\
             [machine]\nvelocity_max_mm_s = [100, 100, 50]\nacceleration_max_mm_s2 = [1000, 1000, 500]\n\
-            jerk_max_mm_s3 = [20000, 20000, 10000]\n";
-        let mut prepared = prepare(&job_file::parse("sliver.toml", text).unwrap()).unwrap();
+            jerk_max_mm_s3 = [20000, 20000, 10000]\n"
+        );
+        let mut prepared = prepare(&job_file::parse("region.toml", &text).unwrap()).unwrap();
         machine::links::add(&mut prepared, &[Link::Straight; 100]);
-        let course = Self::new("sliver", prepared.header, &prepared.words);
-        let [x, y, z] = course.ends[0];
+        let name = format!("region of {patches} patches");
+        Self::new(&name, prepared.header, &prepared.words)
+    }
+
+    /// After slivers comes a pass that takes longer to plan, for which the tool waits above the end of the last of them.
+    fn of_slivers() -> Self {
+        let course = Self::of_region(
+            24,
+            "[[0.1, 0.1], [0.12, 0.1], [0.12, 0.3], [0.9, 0.3], [0.9, 0.8], [0.1, 0.8]]",
+        );
+        let (_, passes) = course.ends.split_last().unwrap();
         let waits = |start: &Start| {
             let [at_x, at_y, at_z] = start.sample.cl_nm;
-            [at_x, at_y] == [x, y] && at_z > z + 200_000 && start.sample.feed_mm_s < 1.0
+            let is_above = |[x, y, z]: &[i32; 3]| [at_x, at_y] == [*x, *y] && at_z > z + 200_000;
+            passes.iter().any(is_above) && start.sample.feed_mm_s < 1.0
         };
         assert!(
             course
@@ -220,7 +241,7 @@ impl Course {
             Self::of_job("freeform", 3600.0, job::Pattern::Zigzag, 0.0),
             Self::of_job("plate_v", 3600.0, job::Pattern::Zigzag, 2.0),
             Self::of_job("sphere_cap", 3000.0, job::Pattern::Zig, 0.0),
-            Self::of_sliver(),
+            Self::of_slivers(),
         ]
     }
 }
@@ -394,6 +415,58 @@ impl Run<'_> {
     }
 }
 
+impl Course {
+    /// Runs steps from one of the places.
+    fn run(&self, start: &Start, steps: &[Step]) -> Result<Outcome, String> {
+        let mut run = Run {
+            course: self,
+            core: start.core.clone(),
+            uses: start.uses.clone(),
+            last: start.sample,
+            percent: 100,
+            greatest: 100,
+            follows: 0,
+            holding: 0,
+            standing: 0,
+            stops: false,
+            held: false,
+            outcome: Outcome {
+                count: 1,
+                ..Outcome::default()
+            },
+        };
+        let end = run.follow(steps);
+        let (name, tick) = (&self.name, run.last.tick);
+        let told = |what| {
+            format!(
+                "{name} from tick {}, {steps:?}: {what}, tick {tick}",
+                start.sample.tick
+            )
+        };
+        end.map_err(told)?;
+        run.outcome.worst = run.uses.worst;
+        if !run.uses.are_permitted() {
+            return Err(told(format!("{:?} of the limits", run.uses.worst)));
+        }
+        if run.outcome.stand.0 > STANDS {
+            run.outcome.stands = 1;
+        }
+        Ok(run.outcome)
+    }
+
+    /// What comes of an override of 0 for 100 periods at each of the places.
+    ///
+    /// # Errors
+    /// What the first that breaks something breaks.
+    pub fn pause_at_each_place(&self) -> Result<Outcome, String> {
+        let mut all = Outcome::default();
+        for start in &self.starts {
+            all.add(&self.run(start, &[(1, None, 0), (100, None, 100)])?);
+        }
+        Ok(all)
+    }
+}
+
 /// Runs the sequence of a seed.
 ///
 /// # Errors
@@ -403,42 +476,11 @@ pub fn run(courses: &[Course], seed: u64) -> Result<Outcome, String> {
     let course = &courses[random.below(courses.len())];
     let start = &course.starts[random.below(course.starts.len())];
     let steps = steps(&mut random, course.is_short);
-    let name = &course.name;
-    let mut run = Run {
-        course,
-        core: start.core.clone(),
-        uses: start.uses.clone(),
-        last: start.sample,
-        percent: 100,
-        greatest: 100,
-        follows: 0,
-        holding: 0,
-        standing: 0,
-        stops: false,
-        held: false,
-        outcome: Outcome {
-            count: 1,
-            ..Outcome::default()
-        },
-    };
-    let told = |what: String, tick: u32| {
-        format!(
-            "seed {seed}: {name} from tick {}, {steps:?}: {what}, tick {tick}",
-            start.sample.tick
-        )
-    };
-    let end = run.follow(&steps);
-    let tick = run.last.tick;
-    end.map_err(|what| told(what, tick))?;
-    run.outcome.worst = run.uses.worst;
-    if !run.uses.are_permitted() {
-        return Err(told(format!("{:?} of the limits", run.uses.worst), tick));
-    }
-    if run.outcome.stand.0 > STANDS {
-        run.outcome.stands = 1;
-    }
-    (run.outcome.stand.1, run.outcome.hold.1) = (seed, seed);
-    Ok(run.outcome)
+    let mut outcome = course
+        .run(start, &steps)
+        .map_err(|what| format!("seed {seed}: {what}"))?;
+    (outcome.stand.1, outcome.hold.1) = (seed, seed);
+    Ok(outcome)
 }
 
 impl Run<'_> {

@@ -42,6 +42,8 @@ const PERIODS_OF_STEP: f32 = 3.0;
 const PERIODS_A_PLACE: f32 = 0.084;
 const PERIODS_A_PLACE_AT_SPEED: f32 = 0.07;
 const PERIODS_LEFT: f32 = 3.0;
+/// Periods from the choice of the nodes to the first step.
+const PERIODS_TO_STEPS: f32 = 50.0;
 /// The same of the search for the last stop before an end at speed, with that stop.
 const PERIODS_OF_STOP: f32 = 400.0;
 
@@ -117,6 +119,9 @@ pub(crate) struct Deadlines {
     pub(crate) least: u32,
     /// What is left until the plan is needed. None where the tool may wait for it.
     pub(crate) left: Option<f32>,
+    /// The tool waits for this plan off the surface, before the first pass: it has the nodes and steps that it is worth, and lasts as long as the usual
+    /// planning of the next one.
+    pub(crate) waits: bool,
 }
 
 /// The planning of one path.
@@ -249,10 +254,18 @@ impl Planner {
 
     /// One piece of work.
     pub(crate) fn work(&mut self, plan: &mut Plan, deadlines: Deadlines) {
-        let least = deadlines.least;
+        let least = if deadlines.waits {
+            deadlines.least.min(self.usual_periods())
+        } else {
+            deadlines.least
+        };
         self.stage = match self.stage {
             Stage::Walk => {
-                if self.walker.work(&mut self.lists, plan, &self.limits, least) {
+                let waits = deadlines.waits;
+                if self
+                    .walker
+                    .work(&mut self.lists, plan, &self.limits, least, waits)
+                {
                     Stage::Weigh
                 } else {
                     Stage::Walk
@@ -387,9 +400,20 @@ impl Planner {
         }
     }
 
+    /// Periods that the planning of a plan like this one takes with as many nodes as are usual where the tool does not wait for it.
+    fn usual_periods(&self) -> u32 {
+        let (nodes, before) = self.walker.usual();
+        let steps = f32::from(self.step) * (PERIODS_A_STEP * f32::from(nodes) + PERIODS_OF_STEP);
+        let periods = PERIODS_TO_STEPS + steps + PERIODS_A_PLACE * to_f32(self.periods);
+        before.saturating_add(u32::try_from(truncated(periods)).unwrap_or(u32::MAX))
+    }
+
     /// Steps that there is time for. A plan is slowed down to what its planning takes, so one that comes too late makes it slower; and the tool stands where
     /// the pass before is over first. With an end at speed the next plan has to be complete before the last stop. `lasts`: periods of the motion.
-    fn steps_left(&self, plan: &Plan, lasts: f32, Deadlines { least, left, .. }: Deadlines) -> u16 {
+    fn steps_left(&self, plan: &Plan, lasts: f32, deadlines: Deadlines) -> u16 {
+        let Deadlines {
+            least, left, waits, ..
+        } = deadlines;
         let is_between = plan.pinned() != [0; 2];
         let [fewest, most] = if is_between {
             [STEPS_LEAST, STEPS_AT_SPEED]
@@ -398,7 +422,7 @@ impl Planner {
         };
         let [fewest, most] = [fewest, most].map(|steps| f32::from(steps.saturating_sub(self.step)));
         let stop = if plan.goes_on() { PERIODS_OF_STOP } else { 0.0 };
-        let own = if least == 0 {
+        let own = if least == 0 || waits {
             f32::MAX
         } else {
             lasts - stop - to_f32(least)
@@ -416,8 +440,8 @@ impl Planner {
         u16::try_from(truncated(steps)).unwrap_or(u16::MAX)
     }
 
-    /// Whether another step is to be taken; chooses its barrier.
-    fn goes_on(&mut self, plan: &Plan, deadlines: Deadlines) -> bool {
+    /// Whether another step is to be taken, for which there is time, or which pays; chooses its barrier.
+    fn goes_on(&mut self, plan: &Plan, deadlines: Deadlines, pays: bool) -> bool {
         if self.step < STEPS_FIRST {
             return true;
         }
@@ -429,7 +453,8 @@ impl Planner {
             BARRIER_LAST_AT_SPEED
         };
         let is_solved = self.barrier <= last && went >= 1.0;
-        if is_solved || self.steps_left(plan, lasts, deadlines) == 0 {
+        let may_go_on = self.steps_left(plan, lasts, deadlines) > 0 || (pays && self.step < STEPS_MAX);
+        if is_solved || !may_go_on {
             return false;
         }
         let change = if went > WENT_FAR {
@@ -444,7 +469,7 @@ impl Planner {
             0..STEPS_SOME => LASTS,
             _ => 1.0,
         };
-        let most = if self.steps_left(plan, share * lasts, deadlines) <= STEPS_AT_END {
+        let most = if !pays && self.steps_left(plan, share * lasts, deadlines) <= STEPS_AT_END {
             BARRIER_AT_END
         } else {
             BARRIER_FIRST_AT_SPEED
@@ -493,8 +518,11 @@ impl Planner {
         self.step += 1;
         self.of_step = deadlines.spent.saturating_sub(self.taken);
         self.taken = deadlines.spent;
+        let before = self.lasts;
         self.lasts = self.lasts(plan);
-        if self.goes_on(plan, deadlines) {
+        // A step that shortens the check by more than it takes itself costs nothing.
+        let pays = PERIODS_A_PLACE * (before - self.lasts) > self.periods_of_step(plan);
+        if self.goes_on(plan, deadlines, pays) {
             return self.begin_step(plan);
         }
         self.begin_check(plan);

@@ -135,6 +135,7 @@ impl Path {
             spent: 0,
             least: 0,
             left: None,
+            waits: false,
         };
         planner.begin(&mut plan);
         while !planner.is_done() {

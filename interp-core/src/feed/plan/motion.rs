@@ -126,6 +126,13 @@ impl Plan {
             let [_, _, c2] = beside.pace_rates(0.0);
             root * square * (s3 * c + 1.5 * s2 * c1 + 0.5 * s1 * c2)
         });
+        // Near the feed the tool moves at exactly that, and the plan's own jerk may help nothing.
+        let is_near = (v - self.limits.feed).abs() < self.change.near;
+        let exact = if is_near { 0.0 } else { j };
+        let j = [
+            j.at_most(j_beside).at_most(exact),
+            j.at_least(j_beside).at_least(exact),
+        ];
         let arc_q10 = cursor.start_q10 + to_q10(interval.arc(x));
         let [from, _] = self.node(cursor.interval);
         let [to, _] = self.node(cursor.interval + 1);
@@ -150,7 +157,7 @@ impl Plan {
         MotionAt {
             v,
             a,
-            j: [j, j_beside],
+            j,
             at_jump,
             q,
             jump,
@@ -179,7 +186,7 @@ impl Plan {
 
 /// The motion of a plan at a place.
 struct MotionAt {
-    /// mm/s, mm/s^2; jerk on either side of a node nearby, mm/s^3.
+    /// mm/s, mm/s^2; least and greatest jerk on either side of a node nearby, mm/s^3.
     v: f32,
     a: f32,
     j: [f32; 2],

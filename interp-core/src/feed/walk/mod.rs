@@ -104,6 +104,8 @@ pub(crate) struct Walker {
     speeds: [f32; 2],
     mean: u16,
     tightened: f32,
+    /// As many intervals as leave the plan longer than its planning, and the periods of that when they were chosen.
+    usual: (u16, u32),
 }
 
 /// Lists of this stage.
@@ -142,6 +144,7 @@ impl Walker {
         speeds: [0.0; 2],
         mean: 0,
         tightened: 1.0,
+        usual: (0, 0),
     };
 
     /// `tightened`: share of the acceleration near an end at speed.
@@ -152,6 +155,11 @@ impl Walker {
         self.finest = 0.5 * period;
         self.stage = Stage::Caps;
         self.jerk = f32::MAX;
+    }
+
+    /// As many intervals as leave the plan longer than its planning, and the least periods of that when they were chosen.
+    pub(crate) const fn usual(&self) -> (u16, u32) {
+        self.usual
     }
 
     /// Cycles of the next portion, by the pessimistic model of `cargo sim budget`.
@@ -187,7 +195,8 @@ impl Walker {
         PORTION_LEAST + (cycles - PORTION_LEAST) * count / most
     }
 
-    /// One portion; whether the walk is complete. `least`: periods that the plan has to take at least, for the planning so far.
+    /// One portion; whether the walk is complete. `least`: periods that the plan has to take at least, for the planning so far; `waits`: the tool waits
+    /// for it.
     #[inline(never)]
     pub(crate) fn work(
         &mut self,
@@ -195,6 +204,7 @@ impl Walker {
         plan: &mut Plan,
         limits: &MotionLimits,
         least: u32,
+        waits: bool,
     ) -> bool {
         let count = plan.stations.count();
         self.stage = match self.stage {
@@ -243,7 +253,7 @@ impl Walker {
                 self.forwards(lists, plan, self.index, end);
                 if end == last {
                     self.choose_mean(plan);
-                    self.choose_intervals(limits, least);
+                    self.choose_intervals(limits, least, waits);
                 }
                 self.next(end, end == last, Stage::Forwards, Stage::Rests)
             }

@@ -53,8 +53,8 @@ impl Walker {
         self.mean_s = self.mean_s.at_least(4.0 * self.finest);
     }
 
-    /// As many intervals as are worth their planning, and no more than leave the plan longer than its planning.
-    pub(super) fn choose_intervals(&mut self, limits: &MotionLimits, least: u32) {
+    /// As many intervals as are worth their planning, and no more than leave the plan longer than its planning, unless the tool waits for it.
+    pub(super) fn choose_intervals(&mut self, limits: &MotionLimits, least: u32, waits: bool) {
         let whole = |value: f32| u16::try_from(truncated(value.at_least(0.0))).unwrap_or(u16::MAX);
         let time = self.duration;
         let most = whole(time / self.finest).clamp(NODES_LEAST, NODES_COUNT);
@@ -71,7 +71,11 @@ impl Walker {
             let left = lasts * (1.0 - PERIODS_A_PLACE) - plan - to_f32(i64::from(least));
             let planned = whole(left / node);
             let fewest = NODES_FEW.min(most);
-            self.intervals = self.intervals.min(planned).max(fewest);
+            let usual = self.intervals.min(planned).max(fewest);
+            self.usual = (usual, least);
+            if !waits {
+                self.intervals = usual;
+            }
         }
         self.growth = if time > LONG { GROWTH_LONG } else { GROWTH };
         let parts = if self.is_from_rest_to_rest() { 6.0 } else { 16.0 };

@@ -491,6 +491,7 @@ impl Sequencer {
                         spent: self.spent,
                         least,
                         left,
+                        waits: next.pass == self.first.pass,
                     },
                 );
                 if self.planner.is_done() {
