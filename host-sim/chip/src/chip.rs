@@ -357,6 +357,9 @@ impl Chip {
     /// TIM1's events up to a time, and the transfers that they request.
     fn play(&mut self, until: u64) {
         while self.next_slot <= until {
+            if self.pass_slots(until) {
+                continue;
+            }
             let at = self.next_slot;
             self.happened = at;
             let (stream, asks) = if self.tim1.compare_at <= at {
@@ -374,6 +377,23 @@ impl Chip {
                 self.keep(change);
             }
         }
+    }
+
+    /// Slots in which no pin changes, most of all, are over at once.
+    fn pass_slots(&mut self, until: u64) -> bool {
+        let rounds = self.tim1.rounds(until);
+        if rounds == 0 {
+            return false;
+        }
+        let streams = [TIM1_UPDATE_STREAM, TIM1_COMPARE_STREAM];
+        let rounds = self
+            .dma
+            .pass_idle(streams, TIM1_CHANNEL, rounds, self.sram, &self.ports);
+        if rounds > 0 {
+            self.happened = self.tim1.pass(rounds);
+            self.plan_slot();
+        }
+        rounds > 0
     }
 
     fn happen(&mut self, at: u64) {

@@ -67,6 +67,33 @@ impl Memory {
         true
     }
 
+    /// How many of these words, from an address that is a multiple of four on, have this value, up to the first other one; None where they are not all within
+    /// this memory.
+    #[allow(unsafe_code, reason = "memory that the processor shares")]
+    pub(crate) fn repeats(self, address: u32, words: u32, value: u32) -> Option<u32> {
+        let offset = self.place(address & !3, words.checked_mul(4)?)?;
+        // SAFETY: within the memory, which is aligned to a page; nothing writes to it meanwhile, as in `word`.
+        let words =
+            unsafe { std::slice::from_raw_parts(self.first.add(offset).cast::<u32>(), words as usize) };
+        let other = words.iter().position(|word| *word != value);
+        Some(other.unwrap_or(words.len()) as u32)
+    }
+
+    /// Sets these words; false where they are not all within this memory.
+    #[allow(unsafe_code, reason = "memory that the processor shares")]
+    pub(crate) fn fill_words(self, address: u32, words: u32, value: u32) -> bool {
+        let Some(offset) = words
+            .checked_mul(4)
+            .and_then(|bytes| self.place(address & !3, bytes))
+        else {
+            return false;
+        };
+        // SAFETY: as in `repeats`; the slice is the only reference while it exists.
+        unsafe { std::slice::from_raw_parts_mut(self.first.add(offset).cast::<u32>(), words as usize) }
+            .fill(value);
+        true
+    }
+
     /// Sets every byte.
     #[allow(unsafe_code, reason = "memory that the processor shares")]
     pub(crate) fn fill(self, value: u8) {

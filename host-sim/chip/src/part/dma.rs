@@ -19,7 +19,7 @@ const PROTECTED: u32 = 0x0fe7_ffc0 & !SECOND;
 const COMPLETE: u32 = 1 << 5;
 const FLAGS: u32 = 0x3d;
 
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Stream {
     control: u32,
     left: u32,
@@ -40,6 +40,19 @@ impl Stream {
     fn address(&self) -> u32 {
         let base = self.memory[usize::from(self.control & SECOND != 0)];
         base + 4 * (self.reload - self.left)
+    }
+
+    /// Whether it answers requests of this channel in this direction.
+    const fn answers(&self, channel: u32, direction: u32) -> bool {
+        self.control & ENABLE != 0 && self.field(25, 3) == channel && self.field(6, 2) == direction
+    }
+
+    /// The port whose set/reset register is the destination.
+    const fn port(&self) -> Option<usize> {
+        match self.peripheral.checked_sub(0x4002_0018) {
+            Some(offset) if offset % 0x400 == 0 && offset / 0x400 < 9 => Some(offset as usize / 0x400),
+            _ => None,
+        }
     }
 }
 
@@ -158,12 +171,8 @@ impl Dma {
                 port: 0,
                 value: stream.loaded,
             });
-            match stream.peripheral.checked_sub(0x4002_0018) {
-                Some(offset) if offset % 0x400 == 0 && offset / 0x400 < 9 => {
-                    if let Some(write) = &mut write {
-                        write.port = offset as usize / 0x400;
-                    }
-                }
+            match (stream.port(), &mut write) {
+                (Some(port), Some(write)) => write.port = port,
                 _ => world.wrong_once(format!(
                     "DMA2 stream {number} writes {:#x}: not modelled",
                     stream.peripheral
@@ -191,6 +200,40 @@ impl Dma {
             self.load(number, sram, world);
         }
         write
+    }
+
+    /// Executes at once what changes no level of so many rounds of requests: one to a stream from memory to a port, and then one to a stream that copies
+    /// the idle word over what was transferred. Ends where another word than this comes, or a buffer. Returns the number of rounds executed.
+    pub(crate) fn pass_idle(
+        &mut self,
+        [to_port, to_memory]: [usize; 2],
+        channel: u32,
+        rounds: u64,
+        sram: Memory,
+        ports: &[Port; 9],
+    ) -> u64 {
+        let (play, copy) = (&self.streams[to_port], &self.streams[to_memory]);
+        if !play.answers(channel, 1) || !copy.answers(channel, 0) {
+            return 0;
+        }
+        let idle = play.loaded;
+        let is_at_rest = play.port().is_some_and(|port| ports[port].is_at(idle));
+        if !is_at_rest || sram.word(copy.peripheral) != Some(idle) {
+            return 0;
+        }
+        let most = play.left.min(copy.left).saturating_sub(1);
+        let most = u32::try_from(rounds).map_or(most, |rounds| rounds.min(most));
+        // The word after the last one transferred is loaded.
+        let rounds = sram.repeats(play.address() + 4, most, idle).unwrap_or(0);
+        if !sram.fill_words(copy.address(), rounds, idle) {
+            return 0;
+        }
+        for number in [to_port, to_memory] {
+            self.streams[number].left -= rounds;
+        }
+        self.played += u64::from(rounds);
+        self.stored += u64::from(rounds);
+        rounds.into()
     }
 
     fn complete(&mut self, number: usize) {
@@ -288,4 +331,124 @@ impl Dma {
 /// Applies a transfer to the ports; the port whose level changed.
 pub(crate) fn apply(write: &Write, ports: &mut [Port; 9]) -> Option<usize> {
     ports[write.port].set_reset(write.value).then_some(write.port)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::part::timer::Timer;
+
+    const SRAM: u32 = 0x2000_0000;
+    const BUFFER_WORDS: u32 = 50;
+    const IDLE: u32 = 0x0007_0000;
+    const STREAMS: [usize; 2] = [5, 1];
+    const UNTIL: u64 = 40_000;
+
+    /// What plays step pulses: a timer, two streams, a port.
+    struct Output {
+        timer: Timer,
+        dma: Dma,
+        sram: Memory,
+        ports: [Port; 9],
+        world: World,
+        changes: Vec<(u64, u32)>,
+        idle_rounds: u64,
+    }
+
+    impl Output {
+        fn new(words: &[u32]) -> Self {
+            let mut world = World::new(168e6, false);
+            let sram = Memory::new(SRAM, 0x1000, 0);
+            for (place, word) in (0..).zip(words) {
+                sram.set_word(SRAM + 4 * place, *word);
+            }
+            let idle = SRAM + 0x800;
+            sram.set_word(idle, IDLE);
+            let mut dma = Dma::default();
+            for (stream, peripheral, direction) in [(5, 0x4002_0018, 1), (1, idle, 0)] {
+                let mut set = |register: u32, value: u32| {
+                    dma.write(0x10 + 0x18 * stream + register, value, sram, &mut world);
+                };
+                set(0x04, BUFFER_WORDS);
+                set(0x08, peripheral);
+                set(0x0c, SRAM);
+                set(0x10, SRAM + 4 * BUFFER_WORDS);
+                // Channel 6, double buffer, words, an address in memory that counts.
+                set(
+                    0x00,
+                    6 << 25 | DOUBLE | 2 << 13 | 2 << 11 | MEMORY_COUNTS | CIRCULAR | direction << 6 | ENABLE,
+                );
+            }
+            let mut timer = Timer::new("TIM1", 0xffff);
+            for (register, value) in [(0x2c, 167), (0x34, 80), (0x0c, 0x300), (0x00, 1)] {
+                timer.write(register, value, 1, &mut world);
+            }
+            assert_eq!(world.complained, 0, "{:?}", world.complaints);
+            Self {
+                timer,
+                dma,
+                sram,
+                ports: [0, 1, 2, 3, 4, 5, 6, 7, 8].map(|index| Port::new(index, 0, 0)),
+                world,
+                changes: Vec::new(),
+                idle_rounds: 0,
+            }
+        }
+
+        fn event(&mut self) {
+            let at = self.timer.update_at().min(self.timer.compare_at);
+            let (stream, asks) = if self.timer.compare_at <= at {
+                (STREAMS[1], self.timer.compared())
+            } else {
+                (STREAMS[0], self.timer.update(at).1)
+            };
+            assert!(asks);
+            let write = self.dma.request(stream, 6, self.sram, &mut self.world);
+            if let Some(port) = write.and_then(|write| apply(&write, &mut self.ports)) {
+                self.changes
+                    .push((at, self.ports[port].read(0x14, &mut self.world)));
+            }
+        }
+
+        fn play(mut self, at_once: bool) -> Self {
+            while self.timer.update_at().min(self.timer.compare_at) <= UNTIL {
+                let rounds = if at_once { self.timer.rounds(UNTIL) } else { 0 };
+                let rounds = self.dma.pass_idle(STREAMS, 6, rounds, self.sram, &self.ports);
+                if rounds > 0 {
+                    self.timer.pass(rounds);
+                    self.idle_rounds += rounds;
+                } else {
+                    self.event();
+                }
+            }
+            self
+        }
+    }
+
+    /// Idle rounds at once leave the streams, the timer, the memory and the port as one after the other does, whatever is in the buffers.
+    #[test]
+    fn idle_rounds_at_once_are_those_one_by_one() {
+        let mut random = fastrand::Rng::with_seed(1);
+        for pulses in [0, 1, 2, 5, 30, 100] {
+            let mut words = vec![IDLE; 2 * BUFFER_WORDS as usize];
+            for _ in 0..pulses {
+                words[random.usize(..2 * BUFFER_WORDS as usize)] = random.u32(..8) | random.u32(..8) << 16;
+            }
+            let [one_by_one, at_once] = [false, true].map(|at_once| Output::new(&words).play(at_once));
+            assert!(pulses > 5 || at_once.idle_rounds > 100, "{}", at_once.idle_rounds);
+            assert!(pulses == 0 || !at_once.changes.is_empty());
+            assert_eq!(one_by_one.changes, at_once.changes);
+            assert_eq!(one_by_one.dma.streams, at_once.dma.streams);
+            assert_eq!(one_by_one.dma.flags, at_once.dma.flags);
+            assert_eq!(one_by_one.dma.played, at_once.dma.played);
+            assert_eq!(one_by_one.dma.stored, at_once.dma.stored);
+            assert_eq!(one_by_one.timer, at_once.timer);
+            let memory = |output: &Output| {
+                (0..0x400)
+                    .map(|place| output.sram.word(SRAM + 4 * place))
+                    .collect::<Vec<_>>()
+            };
+            assert_eq!(memory(&one_by_one), memory(&at_once));
+        }
+    }
 }

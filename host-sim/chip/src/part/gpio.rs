@@ -93,6 +93,11 @@ impl Port {
         self.odr != old
     }
 
+    /// Whether this write of `BSRR` would change no level.
+    pub(crate) const fn is_at(&self, value: u32) -> bool {
+        (self.odr & !(value >> 16) | value & 0xffff) == self.odr
+    }
+
     pub(crate) fn read(&self, offset: u32, world: &mut World) -> u32 {
         match offset {
             0x00 => self.moder,

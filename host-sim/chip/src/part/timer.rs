@@ -12,6 +12,7 @@ const INTERRUPTS: u32 = 0xff;
 const UPDATE_REQUEST: u32 = 1 << 8;
 const COMPARE_1_REQUEST: u32 = 1 << 9;
 
+#[derive(Debug, PartialEq, Eq)]
 pub(crate) struct Timer {
     name: &'static str,
     cr1: u32,
@@ -111,6 +112,26 @@ impl Timer {
         self.compare_at = NEVER;
         self.status |= COMPARE_1;
         self.dier & COMPARE_1_REQUEST != 0
+    }
+
+    /// Updates until a time, each with the compare that follows it and both with requests; 0 where a compare comes first.
+    pub(crate) fn rounds(&self, until: u64) -> u64 {
+        const REQUESTS: u32 = UPDATE_REQUEST | COMPARE_1_REQUEST;
+        let first = self.update_at();
+        let is_regular = self.dier & REQUESTS == REQUESTS && self.compare <= self.reload;
+        if !is_regular || first == NEVER || self.compare_at != NEVER {
+            return 0;
+        }
+        let over = first + u64::from(self.compare) * self.step;
+        until.checked_sub(over).map_or(0, |left| left / self.period() + 1)
+    }
+
+    /// Executes so many of them, at least one. Returns the time of the last compare.
+    pub(crate) fn pass(&mut self, rounds: u64) -> u64 {
+        self.update(self.update_at() + (rounds - 1) * self.period());
+        let at = self.compare_at;
+        self.compared();
+        at
     }
 
     /// Whether its update is the trigger output.
