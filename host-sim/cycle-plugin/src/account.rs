@@ -13,6 +13,9 @@ use crate::record::Record;
 /// Greatest nesting of exceptions: one level for each of the 16 priorities, and the thread.
 const CONTEXTS_MAX: usize = 17;
 
+/// First address of the RAM, where the stack ends.
+pub const RAM: u32 = 0x2000_0000;
+
 /// Exceptions of the STM32F405: 16 of the core, 82 of the chip.
 const VECTORS: u32 = 98;
 
@@ -62,8 +65,20 @@ impl Context {
 /// Cycles and operations of all contexts.
 #[derive(Debug)]
 pub struct Account {
+    code: Code,
+    flow: Flow,
+}
+
+/// The image's instructions.
+#[derive(Debug)]
+struct Code {
     plan: Plan,
     decoded: Vec<Option<ImageInstruction>>,
+}
+
+/// The state of the execution.
+#[derive(Debug)]
+struct Flow {
     contexts: Vec<Context>,
     elsewhere: u32,
     unknown: u32,
@@ -77,17 +92,41 @@ impl Account {
         let halfwords = plan.code.len() / 2;
         let stack_low = plan.stack_end;
         Self {
-            plan,
-            decoded: vec![None; halfwords],
-            contexts: vec![Context::default()],
-            elsewhere: 0,
-            unknown: 0,
-            stack_low,
+            code: Code {
+                plan,
+                decoded: vec![None; halfwords],
+            },
+            flow: Flow {
+                contexts: vec![Context::default()],
+                elsewhere: 0,
+                unknown: 0,
+                stack_low,
+            },
         }
     }
 
     /// Decodes the instruction at an address; required before its first execution. Its index; `None` outside the code.
     pub fn decode(&mut self, address: u32) -> Option<usize> {
+        self.code.decode(address)
+    }
+
+    /// Records a store: updates the lowest stack address if the address is on the stack. Returns that; a store above it changes nothing.
+    pub fn store(&mut self, address: u32) -> u32 {
+        let lowest = &mut self.flow.stack_low;
+        if (RAM..*lowest).contains(&address) {
+            *lowest = address;
+        }
+        *lowest
+    }
+
+    /// Charges the instruction at this index, before it is executed. The record of the tick or of the planning if the preceding instruction ended one.
+    pub fn execute(&mut self, index: usize) -> Option<Record> {
+        self.flow.execute(&self.code, index)
+    }
+}
+
+impl Code {
+    fn decode(&mut self, address: u32) -> Option<usize> {
         let index = (address.checked_sub(self.plan.base)? / 2) as usize;
         let (first, second) = (self.plan.halfword(index), self.plan.halfword(index + 1));
         let handler = (2..VECTORS).find(|exception| self.plan.vector(*exception) == address);
@@ -103,38 +142,35 @@ impl Account {
         Some(index)
     }
 
-    /// Records a store: updates the lowest stack address if the address is on the stack.
-    pub fn store(&mut self, address: u32) {
-        if (0x2000_0000..self.stack_low).contains(&address) {
-            self.stack_low = address;
-        }
+    /// By reference: an instruction is looked up several times for each that is executed.
+    fn instruction(&self, index: Option<usize>) -> Option<&ImageInstruction> {
+        self.decoded.get(index?)?.as_ref()
     }
+}
 
-    fn instruction(&self, index: Option<usize>) -> Option<ImageInstruction> {
-        self.decoded.get(index?).copied().flatten()
-    }
-
-    /// Charges the instruction at this index, before it is executed. The record of the tick or of the planning if the preceding instruction ended one.
-    pub fn execute(&mut self, index: usize) -> Option<Record> {
-        let now = self.instruction(Some(index))?;
-        let (ended, leaves) = self.leave(&now);
-        if let Some(exception) = now.handler.filter(|_| leaves || self.is_entry(&now)) {
-            self.enter(exception, &now);
+impl Flow {
+    fn execute(&mut self, code: &Code, index: usize) -> Option<Record> {
+        let now = code.instruction(Some(index))?;
+        let (ended, leaves) = self.leave(code, now);
+        if let Some(exception) = now.handler.filter(|_| leaves || self.is_entry(code, now)) {
+            self.enter(exception, now);
         }
-        self.run(index, &now);
+        self.run(code, index, now);
         ended
     }
 
+    /// The instruction that the running context has executed last.
+    fn before<'code>(&self, code: &'code Code) -> Option<&'code ImageInstruction> {
+        code.instruction(self.contexts.last()?.last)
+    }
+
     /// Whether a handler's first instruction was reached without a branch: an exception entry.
-    fn is_entry(&self, now: &ImageInstruction) -> bool {
-        let before = self
-            .contexts
-            .last()
-            .and_then(|context| self.instruction(context.last));
-        before.is_none_or(|before| match before.located.instruction.class {
-            Class::Branch(Branch::Direct(to) | Branch::Call(to)) => to != now.located.address,
-            _ => true,
-        })
+    fn is_entry(&self, code: &Code, now: &ImageInstruction) -> bool {
+        self.before(code)
+            .is_none_or(|before| match before.located.instruction.class {
+                Class::Branch(Branch::Direct(to) | Branch::Call(to)) => to != now.located.address,
+                _ => true,
+            })
     }
 
     fn enter(&mut self, exception: u32, now: &ImageInstruction) {
@@ -157,11 +193,8 @@ impl Account {
 
     /// Closes the exception if the preceding instruction returned from it. The record if it was the sample or the planning task, and
     /// whether an exception was left.
-    fn leave(&mut self, next: &ImageInstruction) -> (Option<Record>, bool) {
-        let Some(context) = self.contexts.last() else {
-            return (None, false);
-        };
-        let Some(before) = self.instruction(context.last) else {
+    fn leave(&mut self, code: &Code, next: &ImageInstruction) -> (Option<Record>, bool) {
+        let (Some(context), Some(before)) = (self.contexts.last(), self.before(code)) else {
             return (None, false);
         };
         let in_handler = context.exception != 0 && context.callers.is_empty();
@@ -180,12 +213,12 @@ impl Account {
                 pessimistic: EXCEPTION + restored + cost::WAIT_STATES,
             },
         );
-        (self.close(&context), true)
+        (self.close(code, &context), true)
     }
 
-    fn close(&mut self, context: &Context) -> Option<Record> {
-        let is_planning = context.exception == self.plan.planning;
-        if !is_planning && context.exception != self.plan.exception {
+    fn close(&mut self, code: &Code, context: &Context) -> Option<Record> {
+        let is_planning = context.exception == code.plan.planning;
+        if !is_planning && context.exception != code.plan.exception {
             return None;
         }
         Some(Record {
@@ -203,9 +236,8 @@ impl Account {
         })
     }
 
-    fn run(&mut self, index: usize, now: &ImageInstruction) {
-        let last = self.contexts.last().and_then(|context| context.last);
-        let before = self.instruction(last);
+    fn run(&mut self, code: &Code, index: usize, now: &ImageInstruction) {
+        let before = self.before(code);
         let Some(context) = self.contexts.last_mut() else {
             return;
         };
@@ -216,11 +248,11 @@ impl Account {
         // A jump flushes the pipeline.
         let neighbour = before
             .filter(|before| before.located.end() == now.located.address)
-            .map(|before| before.located.instruction);
+            .map(|before| &before.located.instruction);
         let stage = context.stage(now.stage);
         context.last = Some(index);
         context.charged = stage as usize;
-        context.charge(stage as usize, cost::straight(neighbour.as_ref(), instruction));
+        context.charge(stage as usize, cost::straight(neighbour, instruction));
         let operations = context.counter.count(instruction);
         if let Some(total) = context.operations.get_mut(stage as usize) {
             *total = total.plus(operations);
@@ -237,7 +269,7 @@ impl Account {
             self.unknown = self.unknown.saturating_add(1);
         }
         context.instructions = context.instructions.saturating_add(1);
-        if context.exception != self.plan.exception {
+        if context.exception != code.plan.exception {
             self.elsewhere = self.elsewhere.saturating_add(1);
         }
     }

@@ -10,9 +10,9 @@ use std::ffi::{CStr, c_char, c_int, c_uint, c_void};
 use std::fs::File;
 use std::io::Write;
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicI32, Ordering};
+use std::sync::atomic::{AtomicI32, AtomicU32, Ordering};
 
-use crate::account::Account;
+use crate::account::{Account, RAM};
 use crate::plan::Plan;
 use crate::record::Record;
 
@@ -115,6 +115,9 @@ struct Plugin {
 
 static PLUGIN: Mutex<Option<Plugin>> = Mutex::new(None);
 
+/// The lowest address on the stack that was stored to, without the lock: most stores are above it.
+static STORED_LOWEST: AtomicU32 = AtomicU32::new(u32::MAX);
+
 fn with_plugin(f: impl FnOnce(&mut Plugin)) {
     if let Ok(mut plugin) = PLUGIN.lock()
         && let Some(plugin) = plugin.as_mut()
@@ -214,9 +217,9 @@ extern "C" fn executed(_processor: c_uint, index: *mut c_void) {
 }
 
 extern "C" fn stored(_processor: c_uint, _access: c_uint, address: u64, _data: *mut c_void) {
-    with_plugin(|plugin| {
-        if let Ok(address) = u32::try_from(address) {
-            plugin.account.store(address);
-        }
-    });
+    if let Ok(address) = u32::try_from(address)
+        && (RAM..STORED_LOWEST.load(Ordering::Relaxed)).contains(&address)
+    {
+        with_plugin(|plugin| STORED_LOWEST.store(plugin.account.store(address), Ordering::Relaxed));
+    }
 }

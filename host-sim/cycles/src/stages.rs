@@ -8,9 +8,9 @@
 //! Limits: code that the compiler merged from two stages has the line of one; evaluations at the end of a patch, which a change
 //! of patch needs, are charged to `step` and `surface`.
 
-use std::collections::BTreeMap;
+use std::collections::HashMap;
 
-use addr2line::Loader;
+use addr2line::{FunctionName, Loader, gimli};
 use cycle_plugin::plan::Stage;
 
 /// A module of `interp_core` (a function in it, or all of it) and its stage; the first match applies. A name that occurs nowhere in
@@ -170,22 +170,37 @@ pub fn plain(path: &str) -> String {
     parts.collect::<Vec<_>>().join("::")
 }
 
+/// Classification of a function of the image; `known`: by their names there, because demangling them takes longer than everything else.
+fn entry<R: gimli::Reader>(known: &mut HashMap<String, Entry>, function: Option<&FunctionName<R>>) -> Entry {
+    let name = function
+        .and_then(|function| function.raw_name().ok())
+        .unwrap_or_default();
+    if let Some(entry) = known.get(name.as_ref()) {
+        return *entry;
+    }
+    let path = function
+        .and_then(|function| function.demangle().ok())
+        .unwrap_or_default();
+    let entry = Entry::of(&path);
+    known.insert(name.into_owned(), entry);
+    entry
+}
+
 /// Stage of the instruction at each halfword of the code from `base` on.
 ///
 /// # Errors
 /// The lines of the table that match no function of the image.
 pub fn map(lines: &Loader, base: u32, code: &[u8]) -> Result<Vec<Option<Stage>>, Vec<String>> {
-    let mut known: BTreeMap<String, Entry> = BTreeMap::new();
+    let mut known = HashMap::new();
     let map = (0..code.len() / 2)
         .map(|index| {
             let address = base + 2 * u32::try_from(index).unwrap_or(0);
-            let stages: Vec<_> = chain(lines, address)
-                .into_iter()
-                .map(|path| {
-                    let entry = Entry::of(&path);
-                    known.entry(path).or_insert(entry).stage()
-                })
-                .collect();
+            let mut stages = Vec::new();
+            if let Ok(mut frames) = lines.find_frames(address.into()) {
+                while let Ok(Some(frame)) = frames.next() {
+                    stages.push(entry(&mut known, frame.function.as_ref()).stage());
+                }
+            }
             of_chain(&stages)
         })
         .collect();
