@@ -18,7 +18,7 @@ use cycles::search::search;
 use cycles::session::MeasurementSession;
 use cycles::{
     PERIOD_CYCLES, PLANNING_CYCLES_MAX, SURFACES, TICK_SHARE_MAX_PCT, figures, figures::Figure, golden,
-    graph, image, operations, operations::Operations,
+    image, operations, operations::Operations,
 };
 use machine::prepare::prepare;
 use machine::remote::qemu::{self, Qemu};
@@ -395,7 +395,7 @@ fn a_tail_call_keeps_the_stage() {
 #[test]
 fn the_image_is_bounded() {
     let path = images::for_qemu();
-    let analysis = graph::analyse(path).unwrap();
+    let analysis = images::analysis();
     assert!(analysis.task.len() > 5, "{:?}", analysis.task);
     assert_eq!(analysis.unresolved, [""; 0], "not followed");
     let unbounded = analysis.unbounded();
@@ -517,7 +517,7 @@ fn check_search(jobs: u32, class: JobClass) {
     let planning = session.planning_cycles_max();
     assert!(planning > 0);
     assert!(planning <= PLANNING_CYCLES_MAX, "{planning} cycles of planning");
-    let analysis = graph::analyse(images::for_qemu()).unwrap();
+    let analysis = images::analysis();
     assert!(
         session.stack_bytes() <= analysis.stack_bytes(),
         "more stack than the image says"

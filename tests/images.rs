@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
+use cycles::graph::{self, Analysis};
 use cycles::measure::{MeasurementSetup, Ticks};
 use cycles::{SURFACES, TICKS, image};
 use machine::prepare::prepare;
@@ -12,6 +13,12 @@ use machine::remote::qemu;
 pub(crate) fn for_qemu() -> &'static Path {
     static IMAGE: OnceLock<PathBuf> = OnceLock::new();
     IMAGE.get_or_init(|| qemu::firmware().unwrap())
+}
+
+/// What its code says of stack and loops.
+pub(crate) fn analysis() -> &'static Analysis {
+    static ANALYSIS: OnceLock<Analysis> = OnceLock::new();
+    ANALYSIS.get_or_init(|| graph::analyse(for_qemu()).unwrap())
 }
 
 /// The image for QEMU with the plugin that counts cycles.
