@@ -124,18 +124,32 @@ fn a_run_that_begins_at_a_pass_has_the_same_passes() {
     }
 }
 
-/// Distance of a place from the polyline through samples, nm.
-fn beside_nm(path: &[Sample], at: [i32; 3]) -> f64 {
+/// Distance of a place from the line between two samples, nm.
+fn beside_nm(pair: &[Sample], at: [i32; 3]) -> f64 {
     let sub = |a: [i32; 3], b: [i32; 3]| [0, 1, 2].map(|axis| f64::from(a[axis]) - f64::from(b[axis]));
     let dot = |a: [f64; 3], b: [f64; 3]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-    path.windows(2)
-        .map(|pair| {
-            let (way, to) = (sub(pair[1].cl_nm, pair[0].cl_nm), sub(at, pair[0].cl_nm));
-            let part = (dot(way, to) / dot(way, way).max(1.0)).clamp(0.0, 1.0);
-            let rest = [0, 1, 2].map(|axis| to[axis] - part * way[axis]);
-            dot(rest, rest).sqrt()
-        })
-        .fold(f64::INFINITY, f64::min)
+    let (way, to) = (sub(pair[1].cl_nm, pair[0].cl_nm), sub(at, pair[0].cl_nm));
+    let part = (dot(way, to) / dot(way, way).max(1.0)).clamp(0.0, 1.0);
+    let rest = [0, 1, 2].map(|axis| to[axis] - part * way[axis]);
+    dot(rest, rest).sqrt()
+}
+
+/// Greatest distance of places along a path from the polyline through its samples, nm. The line that is nearest to a place is looked for around that of the place
+/// before, from this sample of the path on: another one could only be nearer.
+fn deepest_nm<'s>(path: &[Sample], mut nearest: usize, places: impl Iterator<Item = &'s Sample>) -> f64 {
+    const AROUND: usize = 8;
+    let of_place = |place: &Sample| loop {
+        let around = nearest.saturating_sub(AROUND)..(nearest + AROUND + 1).min(path.len() - 1);
+        let (best, nm) = around
+            .map(|line| (line, beside_nm(&path[line..line + 2], place.cl_nm)))
+            .min_by(|(_, a), (_, b)| a.total_cmp(b))
+            .unwrap();
+        if best == nearest {
+            break nm;
+        }
+        nearest = best;
+    };
+    places.map(of_place).fold(0.0, f64::max)
 }
 
 /// Arc of the contact before each sample of a pass, mm.
@@ -187,11 +201,7 @@ fn a_run_that_begins_within_a_pass_goes_on_along_it() {
             let end = pass[pass.len() - 1].cl_nm;
             let is_behind =
                 |sample: &&Sample| job.overrun_mm == 0.0 || distance_nm(sample.cl_nm, end) > 60_000.0;
-            let deepest = rest
-                .iter()
-                .filter(is_behind)
-                .map(|sample| beside_nm(&pass, sample.cl_nm))
-                .fold(0.0, f64::max);
+            let deepest = deepest_nm(&pass, at, rest.iter().filter(is_behind));
             // The samples of the whole are joined by chords here: their height, and rounding.
             let chord = |three: &[Sample]| {
                 let bent = [0, 1, 2].map(|axis| {
