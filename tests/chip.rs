@@ -82,12 +82,13 @@ fn without_a_crystal_everything_stays_at_rest() {
     assert_eq!(changed, 0);
 }
 
-/// Runs a whole sample job over the line: every sample equal to the host's, no byte lost, no tick late.
-fn whole(board: &'static Board, name: &str, home: &str, seed: &str) {
+/// Runs a sample job over the line: every sample equal to the host's, no byte lost, no tick late.
+fn runs(board: &'static Board, name: &str, changes: &[(&str, &str)], home: &str, seed: &str) {
     let emulated = Emulated::start(board, &["--seed", seed]);
     // A job without limits is for a bench without axes.
     let bench = [("[cut]", "[machine]\nhoming_required = false\n\n[cut]")];
-    let job = Job::sample(name, if name == "torus.toml" { &bench } else { &[] });
+    let bench: &[_] = if name == "torus.toml" { &bench } else { &[] };
+    let job = Job::sample(name, &[bench, changes].concat());
     let (done, said) = emulated.run(&job.path, home);
     let ended = emulated.end();
     assert!(
@@ -117,24 +118,37 @@ fn whole(board: &'static Board, name: &str, home: &str, seed: &str) {
     );
 }
 
+/// Each board runs one of the two jobs whole, and the other in a quarter of its passes: `whole_jobs_on_both_boards` runs all of both.
+const COARSE: [(&str, &str); 2] = [
+    ("scallop_mm = 0.005 ", "scallop_mm = 0.08 "),
+    ("scallop_mm = 0.05 ", "scallop_mm = 0.8 "),
+];
+
 #[test]
 fn torus_on_the_stm32f405() {
-    whole(&STM32F405, "torus.toml", "0,0,60", "1");
+    runs(&STM32F405, "torus.toml", &[], "0,0,60", "1");
 }
 
 #[test]
-fn torus_on_the_skr_pro() {
-    whole(&SKR_PRO, "torus.toml", "0,0,60", "2");
+fn coarse_torus_on_the_skr_pro() {
+    runs(&SKR_PRO, "torus.toml", &COARSE[..1], "0,0,60", "2");
 }
 
 #[test]
-fn plate_machine_on_the_stm32f405() {
-    whole(&STM32F405, "plate_machine.toml", "40,30,40", "3");
+fn coarse_plate_machine_on_the_stm32f405() {
+    runs(&STM32F405, "plate_machine.toml", &COARSE[1..], "40,30,40", "3");
 }
 
 #[test]
 fn plate_machine_on_the_skr_pro() {
-    whole(&SKR_PRO, "plate_machine.toml", "40,30,40", "4");
+    runs(&SKR_PRO, "plate_machine.toml", &[], "40,30,40", "4");
+}
+
+#[test]
+#[ignore = "half a minute on each image"]
+fn whole_jobs_on_both_boards() {
+    runs(&SKR_PRO, "torus.toml", &[], "0,0,60", "2");
+    runs(&STM32F405, "plate_machine.toml", &[], "40,30,40", "3");
 }
 
 /// The operator's script in lockstep, with a coarser plate and a quarter of the ticks; `the_whole_script` runs it unchanged.

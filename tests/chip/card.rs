@@ -39,12 +39,15 @@ fn the_cards_image_boots_into_the_same_registers() {
     assert_eq!(text, expected);
 }
 
-/// A whole job, every sample the host's; then the watchdog resets a chip that hangs, the loader starts the image again, and the reset's cause is known.
+/// A whole job, coarser than the sample, every sample the host's; then the watchdog resets a chip that hangs, the loader starts the image again, and the reset's cause is known.
 #[test]
 fn the_cards_image_runs_a_whole_job() {
     let (_folder, file) = card();
     let emulated = Emulated::of_image(&SKR_PRO, &file, &[]);
-    let job = Job::sample("plate_machine.toml", &[]);
+    let job = Job::sample(
+        "plate_machine.toml",
+        &[("scallop_mm = 0.05 ", "scallop_mm = 0.8 ")],
+    );
     let (done, said) = emulated.run(&job.path, "40,30,40");
     let ended = emulated.end();
     assert!(done && said.contains("bit for bit the same"), "{said}");
