@@ -384,6 +384,37 @@ fn poles_askew() {
     }
 }
 
+/// A rational patch of half a millimetre whose pole lies between two nanometres: its unit was 2^-4 nm and less, and the centre up to 14 nm off with a ball of 3 mm.
+#[test]
+fn small_poles_between_nanometres() {
+    for pole_on_u in [true, false] {
+        let SurfaceSpec::Nurbs(mut nurbs) = turned_fan(pole_on_u, true) else {
+            panic!("a spline");
+        };
+        for [x, y, z, _] in nurbs.poles_mm.iter_mut().flatten() {
+            for (axis, shift) in [(x, 34.400_000_482), (y, 15.000_000_337), (z, 2.399_824_343_7)] {
+                *axis = 0.015 * *axis + shift;
+            }
+        }
+        for along in [Along::U, Along::V] {
+            let mut job = job(SurfaceSpec::Nurbs(nurbs.clone()), along, Pattern::Zigzag);
+            (job.side, job.scallop_mm, job.feed_mm_min) = (Side::Up, 0.001, 60.0);
+            job.radius_mm = 3.0;
+            let ran = run(&job, u64::MAX);
+            assert_eq!(ran.fault, None, "{along:?} at {:?}", ran.place);
+            println!(
+                "{pole_on_u} {along:?}: {} nm, interval {}",
+                ran.position_nm, ran.interval
+            );
+            assert!(
+                ran.position_nm <= 3.0,
+                "{along:?}: CL off by {} nm",
+                ran.position_nm
+            );
+        }
+    }
+}
+
 /// The first interval beside a pole is that of the side line with the greatest speed.
 #[test]
 fn interval_beside_a_pole() {

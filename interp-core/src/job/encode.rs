@@ -237,15 +237,21 @@ pub fn rational(c: &[Bicubic; 4], edges: Edges) -> Result<RationalRecord, Encode
         end(edges.side_start, edges.side_end),
     );
     let w = evaluate(weight, u, v);
-    let origin_nm = origin([x, y, z].map(|c| evaluate(c, u, v) / w))?;
+    let point = [x, y, z].map(|c| evaluate(c, u, v) / w);
+    let origin_nm = origin(point)?;
     let mut local = *c;
     let [.., weight] = local.each_mut();
     for value in weight.iter_mut().flatten() {
         *value *= scale;
     }
     let weight = *weight;
-    for (axis, nm) in local.iter_mut().zip(origin_nm) {
-        let origin_mm = f64::from(nm) / NM_PER_MM;
+    for ((axis, nm), mm) in local.iter_mut().zip(origin_nm).zip(point) {
+        // A pole becomes the origin exactly, half a nanometre off at most: otherwise only a coarse unit makes the numerators vanish there, and the normal is off by that unit.
+        let origin_mm = if edges.count() > 0 {
+            mm
+        } else {
+            f64::from(nm) / NM_PER_MM
+        };
         for (value, w) in axis.iter_mut().flatten().zip(weight.iter().flatten()) {
             *value = *value * scale - origin_mm * w;
         }
