@@ -11,11 +11,14 @@ use cad::{JobOptions, Options, machinable, read, write_job};
 use job::{Along, Job, NurbsSpec, Pattern, Side, Spacing, SurfaceSpec};
 use verify::swept::{ERROR_SHARE_MAX, Requirements, SweptResult, measure};
 
-use crate::swept::follow;
+use crate::swept::{Followed, follow};
 use shapes::{Random, SHAPES, Shape};
 
 fn measured(job: &Job) -> SweptResult {
-    let followed = follow(job);
+    measured_of(job, &follow(job))
+}
+
+fn measured_of(job: &Job, followed: &Followed) -> SweptResult {
     measure(
         job,
         &followed.oracle,

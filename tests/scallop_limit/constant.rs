@@ -9,7 +9,7 @@ use machine::prepare::{Prepared, prepare};
 use verify::swept::ERROR_SHARE_MAX;
 
 use super::shapes::{Random, SHAPES, Shape, random_job};
-use super::{excess, measured};
+use super::{excess, measured, measured_of};
 use crate::swept::follow;
 
 /// What a campaign found.
@@ -22,6 +22,9 @@ struct Campaign {
     refused: u32,
     /// The ball does not fit, or the measuring error is above 1 % of the limit.
     unmeasured: u32,
+    /// Of those that were measured: the highest crest above the limit, less the measuring error, a share of the limit; length of the passes, mm.
+    worst: f64,
+    length_mm: f64,
 }
 
 fn fits(prepared: &Prepared) -> bool {
@@ -61,8 +64,13 @@ fn add_case(seed: u64, start: Start, limits: Option<AxisLimits>, campaign: &mut 
             return;
         }
     }
-    let found = measured(&job);
+    let followed = follow(&job);
+    let found = measured_of(&job, &followed);
     let (excess, error) = excess(&job, &found);
+    if error <= ERROR_SHARE_MAX {
+        campaign.worst = campaign.worst.max(excess - error);
+        campaign.length_mm += followed.findings.report.cc_length_mm;
+    }
     // Where the measuring error is large, a crest that was found above the limit is above it all the same.
     if error > ERROR_SHARE_MAX && excess <= ERROR_SHARE_MAX {
         campaign.unmeasured += 1;
@@ -82,7 +90,10 @@ fn add_case(seed: u64, start: Start, limits: Option<AxisLimits>, campaign: &mut 
 }
 
 fn campaign(seeds: std::ops::Range<u64>, limits: Option<AxisLimits>) -> Campaign {
-    let mut campaign = Campaign::default();
+    let mut campaign = Campaign {
+        worst: -1.0,
+        ..Campaign::default()
+    };
     for seed in seeds {
         for start in [Start::Edge, Start::Middle] {
             add_case(seed, start, limits, &mut campaign);
@@ -108,6 +119,22 @@ fn short_passes_within_axis_limits() {
 
 fn number(name: &str, usual: u64) -> u64 {
     std::env::var(name).map_or(usual, |cases| cases.parse().unwrap())
+}
+
+/// Side lines at 60 degrees, and a front along a knot at which the curvature jumps: the crests were found too high, but the front was lowered beside its balls, up to three intervals
+/// away from them, and they stayed 0.6 and 0.8 % above the limit. At a fifth of the feed, so that the sharp bends are measured.
+#[test]
+fn skew_side_lines_at_a_knot() {
+    for start in [Start::Edge, Start::Middle] {
+        let mut job = random_job(Shape::Skew, &mut Random(campaign_state(182)));
+        (job.spacing, job.machine.limits) = (Spacing::Constant(start), None);
+        job.feed_mm_min /= 5.0;
+        let (excess, error) = excess(&job, &measured(&job));
+        assert!(
+            excess <= error && error <= ERROR_SHARE_MAX,
+            "{start:?}: {excess} within {error}"
+        );
+    }
 }
 
 /// `ISOFEED_CASES` sets the number of surfaces, 210 without, and `ISOFEED_FIRST` leaves out those before it.
@@ -223,7 +250,10 @@ fn passes_of_a_flat_fan() {
 /// Triangles, with a point beside the passes or at their end.
 fn triangles_of(count: usize) -> Campaign {
     let pole = SHAPES.iter().position(|shape| *shape == Shape::Pole).unwrap();
-    let mut found = Campaign::default();
+    let mut found = Campaign {
+        worst: -1.0,
+        ..Campaign::default()
+    };
     for number in 0..count {
         for start in [Start::Edge, Start::Middle] {
             add_case((SHAPES.len() * number + pole) as u64, start, None, &mut found);

@@ -111,6 +111,8 @@ pub(crate) struct Advance {
     is_lowered: bool,
     /// Most by which a station is to be lowered.
     excess: i32,
+    /// The crests of the intervals before this one are measured again.
+    again_before: u16,
     stations: Stations,
     /// The intervals between the stations are longer than a step-over may be.
     is_coarse: bool,
@@ -166,6 +168,7 @@ impl Advance {
         measured: 0,
         is_lowered: false,
         excess: 0,
+        again_before: 0,
         stations: Stations { spans: 1, bits: 6 },
         is_coarse: false,
         direction: Direction::FROM_EDGE,
@@ -390,7 +393,7 @@ impl Advance {
                     (Task::Done, count)
                 } else if self.is_level || self.is_short || self.is_shifted || self.is_on_point {
                     self.excess = 0;
-                    self.search.begin(self.crest_place(0));
+                    self.begin_crests();
                     (Task::Crest, 0)
                 } else {
                     (Task::Compare, 0)
@@ -403,7 +406,7 @@ impl Advance {
             }
             Task::Compare if self.measured < MEASUREMENTS => {
                 self.is_lowered = false;
-                self.search.begin(self.crest_place(0));
+                self.begin_crests();
                 (Task::Crest, 0)
             }
             Task::Crest if self.is_lowered && self.is_on_point => {

@@ -46,6 +46,8 @@ pub(crate) struct CrestSearch {
     at: i32,
     gap: i32,
     first: f32,
+    /// Interval of the ball of the next front that was measured.
+    foot: u16,
     /// Other shares at which the crest was looked for before.
     repeats: u8,
 }
@@ -124,8 +126,14 @@ impl CrestSearch {
         at: 0,
         gap: 0,
         first: 0.0,
+        foot: 0,
         repeats: 0,
     };
+
+    /// Interval of the ball of the next front that leaves the crest: where side lines are skew, that is not the interval of the crest.
+    pub(crate) const fn foot(&self) -> u16 {
+        self.foot
+    }
 
     /// Begins at a place.
     pub(crate) const fn begin(&mut self, place: Place) {
@@ -159,25 +167,26 @@ impl CrestSearch {
                 None
             }
             1 => {
-                self.first = self.height(tools, table, CURRENT);
+                (self.first, _) = self.height(tools, table, CURRENT);
                 self.next = 2;
                 None
             }
             _ => {
-                let second = self.height(tools, table, NEXT);
+                let second;
+                (second, self.foot) = self.height(tools, table, NEXT);
                 self.next = 0;
                 self.excess(tools.job, second, margin)
             }
         }
     }
 
-    /// Height of the ball of a pass above the point, mm.
+    /// Height of the ball of a pass above the point, mm, and the interval that the ball is in.
     fn height<W: Deref<Target = [i32]>>(
         &self,
         tools: &mut Tools<'_, '_>,
         table: &Table<W>,
         columns: [Column; 2],
-    ) -> f32 {
+    ) -> (f32, u16) {
         let point = &self.point;
         // The foot in the metric of the point.
         let mut foot = self.place;
@@ -197,8 +206,14 @@ impl CrestSearch {
             moved = offset(table, foot) - offset(table, self.place);
             curve = tools.curve(table, columns, foot);
         }
+        // Along the boundary lowering the front would not move the pass.
+        let (interval, _) = if curve.at < tools.direction.end {
+            foot
+        } else {
+            self.place
+        };
         let Ok(ball) = tools.frame(table, foot, curve.at) else {
-            return f32::INFINITY;
+            return (f32::INFINITY, interval);
         };
         let chord = apart(&ball.point, &point.point);
         let radius = sqrt(point.offset.dot(point.offset));
@@ -222,7 +237,7 @@ impl CrestSearch {
         } else {
             seen.power
         };
-        seen.height(power)
+        (seen.height(power), interval)
     }
 
     /// The crest from the heights of both balls at the point: their roots are linear in the distance.

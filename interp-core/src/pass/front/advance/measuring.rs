@@ -9,7 +9,7 @@ use crate::math::number::Bounded;
 use crate::pass::front::crest::{CURRENT, NEXT, Place, Tools};
 use crate::pass::front::side::UNIT;
 use crate::pass::front::spline::Cubic;
-use crate::pass::front::table::{Column, Table};
+use crate::pass::front::table::{Column, Table, UNMEASURED};
 
 /// Share of the limit to which the crests of a straight front are measured; by how much more than the excess a front is lowered, and how many times as much after the last measurement.
 const LEVEL_MARGIN: f32 = 0.9999;
@@ -22,6 +22,8 @@ const BENT_COARSE: f32 = 0.02;
 /// Scallop height to which the crests are measured, as a share of the limit: between places near each other, and farther apart.
 const MEASURED_MARGIN: f32 = 0.990;
 const MEASURED_MARGIN_COARSE: f32 = 0.983;
+/// Intervals on either side of a crest that is too high whose crests are measured again.
+const BESIDE: u16 = 2;
 
 impl Advance {
     /// Places at which crests are measured: four in each interval, its middle first, then its start and the quarters; at last both ends.
@@ -41,6 +43,12 @@ impl Advance {
         } else {
             (intervals.saturating_sub(1), i32::MAX)
         }
+    }
+
+    /// Begins a round over all crests.
+    pub(super) fn begin_crests(&mut self) {
+        self.again_before = 0;
+        self.search.begin(self.crest_place(0));
     }
 
     /// The station whose mark stands for a place.
@@ -126,8 +134,23 @@ impl Advance {
         } else {
             excess
         };
-        self.note_excess(table, self.mark_of(self.station), excess);
+        if excess > 0 {
+            self.measure_again(table);
+        }
+        // The front is lowered where its ball is, of the part that is made.
+        let [from, to] = self.within;
+        let foot = self.search.foot().min(to.saturating_sub(1)).max(from);
+        self.note_excess(table, foot, excess);
         self.end_crest(job, table);
+    }
+
+    /// The crests beside one that is too high are to be measured again once the front is lowered: it may be lowered some intervals from here.
+    fn measure_again<W: DerefMut<Target = [i32]>>(&mut self, table: &mut Table<W>) {
+        let station = self.mark_of(self.station);
+        for at in station.saturating_sub(BESIDE)..station {
+            table.set_word(Column::Mark, at, UNMEASURED);
+        }
+        self.again_before = station.saturating_add(BESIDE + 1);
     }
 
     /// Goes on to the next place: from the middle of an interval that is not bent to the next one.
@@ -140,9 +163,13 @@ impl Advance {
         }
         let number = self.station;
         let bit = if number < places { 1 } else { 2 };
-        if number >= places || (number + 1).is_multiple_of(PLACES) {
+        let is_over = number >= places || (number + 1).is_multiple_of(PLACES);
+        if is_over && station >= self.again_before {
             let mark = table.word(Column::Mark, station);
             table.set_word(Column::Mark, station, mark & !bit);
+        }
+        if number + 1 >= places {
+            self.again_before = 0;
         }
         self.next_station(places + 2);
         if self.task == Task::Crest {
