@@ -147,7 +147,8 @@ impl Advance {
     /// The crests beside one that is too high are to be measured again once the front is lowered: it may be lowered some intervals from here.
     fn measure_again<W: DerefMut<Target = [i32]>>(&mut self, table: &mut Table<W>) {
         let station = self.mark_of(self.station);
-        for at in station.saturating_sub(BESIDE)..station {
+        for beside in [1, BESIDE] {
+            let at = station.saturating_sub(beside);
             table.set_word(Column::Mark, at, UNMEASURED);
         }
         self.again_before = station.saturating_add(BESIDE + 1);
