@@ -119,8 +119,9 @@ impl Account {
         *lowest
     }
 
-    /// Charges the instruction at this index, before it is executed. The record of the tick or of the planning if the preceding instruction ended one.
-    pub fn execute(&mut self, index: usize) -> Option<Record> {
+    /// Charges the instruction at this index, before it is executed. The record of the tick or of the planning if the preceding instruction ended one:
+    /// boxed, because most end none.
+    pub fn execute(&mut self, index: usize) -> Option<Box<Record>> {
         self.flow.execute(&self.code, index)
     }
 }
@@ -149,7 +150,7 @@ impl Code {
 }
 
 impl Flow {
-    fn execute(&mut self, code: &Code, index: usize) -> Option<Record> {
+    fn execute(&mut self, code: &Code, index: usize) -> Option<Box<Record>> {
         let now = code.instruction(Some(index))?;
         let (ended, leaves) = self.leave(code, now);
         if let Some(exception) = now.handler.filter(|_| leaves || self.is_entry(code, now)) {
@@ -193,7 +194,7 @@ impl Flow {
 
     /// Closes the exception if the preceding instruction returned from it. The record if it was the sample or the planning task, and
     /// whether an exception was left.
-    fn leave(&mut self, code: &Code, next: &ImageInstruction) -> (Option<Record>, bool) {
+    fn leave(&mut self, code: &Code, next: &ImageInstruction) -> (Option<Box<Record>>, bool) {
         let (Some(context), Some(before)) = (self.contexts.last(), self.before(code)) else {
             return (None, false);
         };
@@ -216,12 +217,12 @@ impl Flow {
         (self.close(code, &context), true)
     }
 
-    fn close(&mut self, code: &Code, context: &Context) -> Option<Record> {
+    fn close(&mut self, code: &Code, context: &Context) -> Option<Box<Record>> {
         let is_planning = context.exception == code.plan.planning;
         if !is_planning && context.exception != code.plan.exception {
             return None;
         }
-        Some(Record {
+        Some(Box::new(Record {
             is_planning,
             instructions: context.instructions,
             elsewhere: if is_planning {
@@ -233,7 +234,7 @@ impl Flow {
             stack_low: self.stack_low,
             stages: context.stages,
             operations: context.operations,
-        })
+        }))
     }
 
     fn run(&mut self, code: &Code, index: usize, now: &ImageInstruction) {
