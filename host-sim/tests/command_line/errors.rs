@@ -1,0 +1,191 @@
+//! Errors: exit codes, the place in the job file, the remedy; faults of a run are as `explain` describes them.
+
+use serde_json::Value;
+
+use super::{err, folder_with, json, out, run};
+
+/// Every kind of invalid input ends with code 2, an error and a remedy.
+#[test]
+fn nonsense_gets_a_remedy() {
+    let folder = folder_with("torus", &[("scallop_mm", "scalop_mm")]);
+    std::fs::write(folder.path().join("empty.toml"), "").unwrap();
+    std::fs::write(folder.path().join("part.step"), "ISO-10303-21;\n").unwrap();
+    for (arguments, says) in [
+        ("simulate", &["<JOB>", "--help"][..]),
+        ("simulat job.toml", &["simulate"]),
+        ("simulate job.toml --trase x", &["--trace"]),
+        (
+            "simulate nope.toml",
+            &["nope.toml: there is no such file", "help:"],
+        ),
+        ("simulate .", &["is a folder", "help:"]),
+        ("simulate empty.toml", &["the file is empty", "cargo sim new"]),
+        ("simulate part.step", &["is a STEP file", "cargo sim import"]),
+        (
+            "simulate job.toml",
+            &["did you mean `scallop_mm`?", "job.toml:43:1", "help:"],
+        ),
+        (
+            "export job.toml --format linuxcnc --clearance -3 -o x",
+            &["--clearance -3 is not above 0", "help:"],
+        ),
+        ("export job.toml --format heidenhain -o x", &["linuxcnc, grbl"]),
+        ("budget --ticks 0", &["0 is not in 1.."]),
+        ("explain ball-dos-not-fit", &["ball-does-not-fit"]),
+        ("new -o .", &["that is a folder: give a file in it"]),
+        ("new -o no/job.toml", &["create the folder first"]),
+        ("completions tcsh", &["bash, zsh, fish"]),
+        ("run job.toml", &["--qemu|--chip <BOARD>|--port"]),
+        ("flash --board arduino", &["stm32f405, skr-pro"]),
+        (
+            "flash --image nope.elf",
+            &["there is no image nope.elf", "cargo fw-chip"],
+        ),
+        (
+            "flash --board skr-pro --image job.toml",
+            &["job.toml: it is no ELF file", "cargo fw-skr-pro"],
+        ),
+        (
+            "flash --board stm32f405 --sd .",
+            &["no boot loader that reads a card", "--dfu"],
+        ),
+        ("flash --board skr-pro --dfu", &["by USB", "--sd DIR"]),
+        (
+            "flash --board skr-pro --sd nowhere",
+            &["no folder nowhere", "FAT32"],
+        ),
+        ("flash --sd . --dfu", &["cannot be used with"]),
+        (
+            "log --image part.step",
+            &["part.step: it is no ELF file", "help:"],
+        ),
+        ("log --from nope.bin", &["--image"]),
+    ] {
+        let output = run(folder.path(), arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments}: {}", err(&output));
+        assert!(output.stdout.is_empty(), "{arguments}");
+        for part in says {
+            assert!(
+                err(&output).contains(part),
+                "{arguments}: {part} is not in {}",
+                err(&output)
+            );
+        }
+    }
+    let help = out(&run(folder.path(), "export --help"));
+    assert!(
+        help.contains("- curve:") && !help.contains("- surface:"),
+        "{help}"
+    );
+}
+
+/// The examples of `explain` for faults that a sample job can cause: the fault occurs, and refers to its explanation.
+#[test]
+fn faults_come_as_explained() {
+    for (job, edits, code, name) in [
+        (
+            "torus",
+            &[("radius_mm = 5", "radius_mm = 9")][..],
+            1,
+            "ball-does-not-fit",
+        ),
+        (
+            "sphere_cap",
+            &[
+                ("along = \"u\"", "along = \"v\""),
+                ("feed_mm_min = 600 ", "feed_mm_min = 500000 "),
+            ],
+            3,
+            "parameter-backwards",
+        ),
+        (
+            "freeform",
+            &[
+                ("feed_mm_min = 1800", "feed_mm_min = 600000"),
+                ("[tool]", "[machine]\nperiod_us = 2000\n\n[tool]"),
+            ],
+            6,
+            "patch-too-short",
+        ),
+    ] {
+        let folder = folder_with(job, edits);
+        // The line of the error: the ball radius, or the feed.
+        let text = std::fs::read_to_string(folder.path().join("job.toml")).unwrap();
+        let line = |key: &str| text.lines().position(|line| line.starts_with(key)).unwrap() + 1;
+        let lines = [line("radius_mm"), line("feed_mm_min")];
+        let output = run(folder.path(), "simulate job.toml --json");
+        assert_eq!(output.status.code(), Some(1), "{job}: {}", err(&output));
+        let told: Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!(
+            (&told["fault"]["code"], &told["fault"]["name"]),
+            (&code.into(), &name.into()),
+            "{told}"
+        );
+        let hint = format!("cargo sim explain {code}");
+        assert!(err(&output).contains(&hint), "{}", err(&output));
+        assert!(
+            err(&output).contains(&format!("job.toml:{}: ", lines[usize::from(code != 1)])),
+            "{}",
+            err(&output)
+        );
+        let explained = json(folder.path(), &format!("explain {code} --json"));
+        assert_eq!(explained["name"], name);
+        if code == 1 {
+            assert_eq!(told["fault"]["tick"], 0);
+            assert!(
+                (told["fault"]["value"].as_f64().unwrap() - 1.125).abs() < 1e-4,
+                "{told}"
+            );
+        }
+    }
+}
+
+/// The examples of `explain` for the job of `cargo sim new`.
+#[test]
+fn faults_of_a_new_job_come_as_explained() {
+    let folder = tempfile::tempdir().unwrap();
+    run(folder.path(), "new");
+    let job = folder.path().join("job.toml");
+    let plain = std::fs::read_to_string(&job).unwrap();
+    let level = "[placement]\nplace = \"top\"\ntranslate_mm = [0, 0, 2145]\n[tool]";
+    for (edits, code) in [
+        (&[("\n[tool]", level)][..], 4),
+        (
+            &[
+                ("radius_mm = 5 ", "radius_mm = 0.000001 "),
+                ("scallop_mm = 0.01 ", "scallop_mm = 1e-12 "),
+            ],
+            7,
+        ),
+    ] {
+        let mut text = plain.replace("along = \"auto\"", "along = \"u\"");
+        for (from, to) in edits {
+            assert!(text.contains(from), "nothing to replace: {from}");
+            text = text.replacen(from, to, 1);
+        }
+        std::fs::write(&job, text).unwrap();
+        let output = run(folder.path(), "simulate job.toml --json");
+        assert_eq!(output.status.code(), Some(1), "{}", err(&output));
+        let told: Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!(told["fault"]["code"], code, "{told}");
+    }
+}
+
+#[test]
+fn a_placed_job_runs_and_its_errors_point_at_the_line() {
+    let placed = "[placement]\nscale = 0.5\nrotate_deg = [0, 0, 90]\nplace = \"top\"\ntranslate_mm = [100, 50, -3]\n\n[tool]";
+    let folder = folder_with("plate", &[("[tool]", placed)]);
+    let told = json(folder.path(), "verify job.toml --json");
+    assert_eq!(told["passed"], true, "{told}");
+    let far = placed.replace("100,", "2200,");
+    let folder = folder_with("plate", &[("[tool]", &far)]);
+    let output = run(folder.path(), "simulate job.toml");
+    assert_eq!(output.status.code(), Some(2));
+    for part in [
+        "the placed surface extends",
+        "translate_mm = [2200",
+        "help: move it nearer",
+    ] {
+        assert!(err(&output).contains(part), "{}", err(&output));
+    }
+}

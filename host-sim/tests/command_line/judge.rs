@@ -1,0 +1,92 @@
+//! Motion from elsewhere, judged on a job: tables of samples and programs.
+
+use serde_json::Value;
+
+use super::{err, folder_with, json, out, run};
+
+/// The core's own samples, judged as anybody's: as `verify` finds them. Moved by 4 um they fail, with that path error.
+#[test]
+fn judge_takes_samples_and_agrees_with_verify() {
+    let folder = folder_with("torus", &[("scallop_mm = 0.005", "scallop_mm = 0.02")]);
+    assert!(
+        run(folder.path(), "simulate job.toml --trace own.csv")
+            .status
+            .success()
+    );
+    let told = json(folder.path(), "judge job.toml own.csv --json --report page");
+    let page = std::fs::read_to_string(folder.path().join("page/index.html")).unwrap();
+    assert!(page.contains("Judged: given, and this core") && page.contains("own.csv on the job"));
+    assert_eq!(told["given"]["reach"]["verdict"], "met");
+    assert_eq!(told["given"]["reach"]["contact"]["above_equator"], 0);
+    let verified = json(folder.path(), "verify job.toml --json");
+    let number = |value: &Value| value.as_f64().unwrap();
+    assert_eq!(told["passed"], true, "{told}");
+    assert_eq!(told["given"], told["core"], "the same motion");
+    let [theirs, ours] = [&told["given"], &verified].map(|of| number(&of["scallop_max_mm"]));
+    assert!((theirs / ours - 1.0).abs() < 2e-3, "{theirs} and {ours}");
+    assert!(number(&told["given"]["path_error_max_mm"]) < 10e-6, "{told}");
+    assert!(number(&told["given"]["ripple_rms_pct"]) < 0.02, "{told}");
+    let trace = std::fs::read_to_string(folder.path().join("own.csv")).unwrap();
+    let mut table = "t_s,x_mm,y_mm,z_mm\n".to_owned();
+    for line in trace.lines().skip(1) {
+        let fields: Vec<&str> = line.split(',').collect();
+        let mm = |index: usize| fields[index].parse::<f64>().unwrap() * 1e-6;
+        table += &format!("{},{},{},{}\n", fields[1], mm(10), mm(11), mm(12) - 5.0 + 0.004);
+    }
+    std::fs::write(folder.path().join("tip.csv"), &table).unwrap();
+    let output = run(folder.path(), "judge job.toml tip.csv --tip --alone --json");
+    assert_eq!(output.status.code(), Some(1), "{}", err(&output));
+    let told: Value = serde_json::from_slice(&output.stdout).unwrap();
+    // The ball sits in the groove, so a lift moves it off the bottom by all of it, and nearer to neither flank.
+    assert!(
+        (number(&told["given"]["path_error_max_mm"]) - 0.004).abs() < 5e-5,
+        "{told}"
+    );
+    assert!(told["core"].is_null());
+    for (text, wanted) in [
+        ("t_s,x,y,z\n0,1,2,3\n", ":1: the columns"),
+        (
+            "t_s,x_mm,y_mm,z_mm\n0,1,2,3\n0.001,1,2,x\n",
+            ":3: `x` is no number",
+        ),
+        (
+            "t_s,x_mm,y_mm,z_mm\n0,1,2,3\n0.001,1,2,3\n0.005,1,2,3\n",
+            "not evenly spaced",
+        ),
+        ("t_s,x_mm,y_mm,z_mm\n0,1,2,3\n", "do not ascend"),
+        ("t_s,x_mm,y_mm,z_mm\n0,1,2,3\n1,1,2,9000\n", "not within 2147"),
+    ] {
+        std::fs::write(folder.path().join("bad.csv"), text).unwrap();
+        let output = run(folder.path(), "judge job.toml bad.csv --json");
+        assert_eq!(output.status.code(), Some(2), "{text}");
+        let told: Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert!(
+            told["error"]["message"].as_str().unwrap().contains(wanted),
+            "{told}"
+        );
+    }
+}
+
+/// A program of chords within 5 um, read by LinuxCNC's interpreter: its path error is at most that, and it shows.
+#[test]
+fn judge_takes_programs() {
+    let folder = folder_with("torus", &[("scallop_mm = 0.005", "scallop_mm = 0.02")]);
+    let exported = run(folder.path(), "export job.toml --format linuxcnc -o part.ngc");
+    assert!(exported.status.success(), "{}", err(&exported));
+    let output = run(
+        folder.path(),
+        "judge job.toml part.ngc --alone --json --path-tolerance 0.0052",
+    );
+    let told: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(
+        told.get("given").is_some(),
+        "LinuxCNC's rs274 is needed, as scripts/setup.sh brings it: {told}"
+    );
+    let error = told["given"]["path_error_max_mm"].as_f64().unwrap();
+    assert!(error > 0.002 && error <= 0.0052, "{error}");
+    let [least, mean] = ["min", "mean"].map(|key| told["given"]["feed_mm_s"][key].as_f64().unwrap());
+    assert!(least < mean && (mean - 10.0).abs() < 0.1, "{mean}");
+    std::fs::write(folder.path().join("bad.ngc"), "G1 X1 Y2 F0 Q\n").unwrap();
+    let refused = run(folder.path(), "judge job.toml bad.ngc --json");
+    assert_eq!(refused.status.code(), Some(2), "{}", out(&refused));
+}
