@@ -1,0 +1,118 @@
+//! Surfaces of every kind: the exact form as a B-spline, placement, least concave radii.
+
+use super::*;
+use crate::exact::exact;
+
+/// The exact form lies on the surface everywhere, and covers the rectangle to its corners.
+#[test]
+fn exact_forms_are_exact() {
+    for (surface, rectangle) in kinds() {
+        let form = exact(&surface, rectangle).unwrap();
+        let [[u0, u1], [v0, v1]] = rectangle;
+        assert_eq!(form.domain(), rectangle);
+        for i in 0..=20 {
+            for j in 0..=20 {
+                let (u, v) = (
+                    u0 + (u1 - u0) * f64::from(i) / 20.0,
+                    v0 + (v1 - v0) * f64::from(j) / 20.0,
+                );
+                let point = form.at(u, v).point;
+                let (place, distance) = surface.invert(point, Some([u, v]));
+                assert!(
+                    distance < 1e-10,
+                    "{}: {distance} mm off at {u}, {v}",
+                    surface.kind()
+                );
+                near(surface.at(place[0], place[1]).point, point, 1e-10, surface.kind());
+            }
+        }
+        for (u, v) in [(u0, v0), (u1, v0), (u0, v1), (u1, v1)] {
+            near(form.at(u, v).point, surface.at(u, v).point, 1e-10, surface.kind());
+        }
+    }
+}
+
+/// A mirrored and scaled copy of a surface has the mirrored and scaled points at the same parameters.
+#[test]
+fn placements_move_points() {
+    let by = Placement {
+        rows: [
+            [0.0, -2.0, 0.0, 5.0],
+            [-2.0, 0.0, 0.0, -7.0],
+            [0.0, 0.0, 2.0, 1.0],
+        ],
+    };
+    assert!(by.mirrors());
+    assert_eq!(by.similarity(), Some(2.0));
+    for (surface, [[u0, u1], [v0, v1]]) in kinds() {
+        let offset = Surface::Offset {
+            base: Box::new(surface.clone()),
+            distance: 0.3,
+        };
+        for surface in [surface, offset] {
+            let placed = surface.placed(&by).unwrap();
+            for share in [0.1, 0.45, 0.8] {
+                let (u, v) = (u0 + share * (u1 - u0), v1 + share * (v0 - v1));
+                near(
+                    placed.at(u, v).point,
+                    by.point(surface.at(u, v).point),
+                    1e-9,
+                    surface.kind(),
+                );
+            }
+        }
+    }
+    let squeezed = Placement {
+        rows: [[1.0, 0.0, 0.0, 0.0], [0.0, 0.5, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]],
+    };
+    assert_eq!(squeezed.similarity(), None);
+}
+
+/// A face whose surface is the part of another one over a rectangle.
+fn rectangular(surface: &Surface, rectangle: [[f64; 2]; 2]) -> Face {
+    let part = exact(surface, rectangle).unwrap();
+    assert!(part.at(rectangle[0][0], rectangle[1][0]).point.is_finite());
+    face(Surface::Spline(part), Vec::new(), 1.0)
+}
+
+/// Least concave radii of a torus and a sphere, both sides, against closed forms.
+#[test]
+fn concave_radii_are_measured() {
+    for (surface, rectangle) in kinds() {
+        let want = match surface.kind() {
+            // S_u x S_v points outwards; the inside of the cylinder, the sphere and the tube is concave.
+            "cylinder" => Some([None, Some(9.0)]),
+            "sphere" => Some([None, Some(12.0)]),
+            // The outside of the torus is concave around its hole, with the least radius on the inner equator.
+            "torus" => Some([Some(14.0), Some(6.0)]),
+            "plane" => Some([None, None]),
+            _ => None,
+        };
+        let Some(want) = want else { continue };
+        let made = machinable(
+            "",
+            &Face {
+                name: None,
+                colour: None,
+                boundary: Boundary::Natural,
+                ..rectangular(&surface, rectangle)
+            },
+            &Options::default(),
+        );
+        let made = made.unwrap_or_else(|error| panic!("{}: {error}", surface.kind()));
+        let measures = measure(&made.spec());
+        for (side, (got, want)) in measures.concave_mm.iter().zip(want).enumerate() {
+            match (got, want) {
+                (None, None) => {}
+                (Some(got), Some(want)) => {
+                    assert!(
+                        (got / want - 1.0).abs() < 1e-3,
+                        "{}, side {side}: {got}",
+                        surface.kind()
+                    );
+                }
+                other => panic!("{}, side {side}: {other:?}", surface.kind()),
+            }
+        }
+    }
+}
