@@ -4,7 +4,7 @@
 //! drive.rs    loads and runs a job there, compares with what was computed here
 //! operate.rs  drives, home, hold and resume: what an operator asks
 //! axes.rs     jog, homing, probing: followed to their end
-//! session.rs  requests, answers; retransmission   |   events.rs  events in order, lost ones again
+//! session/    requests, answers; retransmission   |   events.rs  events in order, lost ones again
 //! feed.rs     the words of a job that is larger than the board's store
 //! script.rs   plays what an operator does, period by period
 //! qemu.rs     starts and ends QEMU with the firmware   |   port.rs  a serial port   |   chip.rs  a board's image without the board

@@ -1,0 +1,159 @@
+//! A request and its reply as frames: numbers, time-outs, retransmission. Events among the replies are queued.
+
+use std::io;
+use std::time::{Duration, Instant};
+
+use protocol::frame::{DELIMITER, FRAME_MAX, write_request};
+use protocol::message::{Reply, Request, next_number, read_reply};
+
+use super::{Event, RemoteError, Session};
+
+/// Time-out of a reply, after which the request is sent again. A reply takes 0.2 ms in QEMU and a few ms over a serial line; a board that
+/// checks a job, or a QEMU that shares its processor, may take longer.
+const ANSWER_TIMEOUT: Duration = Duration::from_millis(1500);
+
+/// The same while a board's patience runs: a share of the time between two frames that it wants to hear, so that one lost frame leaves it well
+/// within its patience. Not below what a USB-serial adapter may keep a frame back.
+const KEEP_ALIVE_SHARE: u32 = 4;
+const ANSWER_TIMEOUT_MIN: Duration = Duration::from_millis(40);
+
+/// The same of a part of a job, whose frame is the longest and so the first to suffer on a bad line: it takes 3 ms on a serial line, and the board a few more for a row
+/// of a streamed job.
+const CHUNK_TIMEOUT: Duration = Duration::from_millis(200);
+
+/// Time after which a request is given up.
+const GIVE_UP: Duration = Duration::from_secs(6);
+
+/// The same of a process, and the time-out of the events of its run.
+pub(super) const PROCESS_SILENCE_TIMEOUT: Duration = Duration::from_secs(780);
+
+impl Session {
+    /// Sends a request, repeatedly if necessary, and waits for the reply with its number.
+    pub(super) fn ask(&mut self, request: &Request) -> Result<Reply, RemoteError> {
+        let number = next_number(self.number);
+        let mut buffer = [0; FRAME_MAX];
+        let frame = write_request(number, request, &mut buffer).map_err(|_| {
+            io::Error::new(
+                io::ErrorKind::InvalidInput,
+                "the request does not fit into a frame",
+            )
+        })?;
+        self.asked = Instant::now();
+        let is_process = self.stream.is_process();
+        let (give_up, silent) = if is_process {
+            (PROCESS_SILENCE_TIMEOUT, "a request was repeated for 13 minutes")
+        } else {
+            (GIVE_UP, "a request was repeated for 6 s")
+        };
+        let mut timeout = self.answer_timeout();
+        if matches!(request, Request::JobChunk { .. }) {
+            timeout = timeout.min(CHUNK_TIMEOUT);
+        }
+        self.tries = 0;
+        while self.asked.elapsed() < give_up {
+            self.tries += 1;
+            self.is_damaged = false;
+            self.stream.write_all(frame)?;
+            self.stream.flush()?;
+            let deadline = Instant::now() + timeout;
+            if is_process {
+                timeout *= 2;
+            }
+            while Instant::now() < deadline {
+                match self.next_reply()? {
+                    Some(reply) => match answered(&reply) {
+                        Some(answered) if answered == number => {
+                            if !matches!(&reply, Reply::Nak { reason, .. } if !reason.uses_number()) {
+                                self.number = number;
+                            }
+                            return Ok(reply);
+                        }
+                        // A frame was damaged in transmission: repeat at once.
+                        Some(0) => break,
+                        _ => {}
+                    },
+                    // Perhaps the answer: the board sends it again for the same bytes.
+                    None if self.is_damaged => break,
+                    None => self.read_some()?,
+                }
+            }
+            self.stream.write_all(&[DELIMITER])?;
+        }
+        Err(RemoteError::Silent(silent))
+    }
+
+    /// How long an answer may take before the request is sent again.
+    fn answer_timeout(&self) -> Duration {
+        self.keep_alive.map_or(ANSWER_TIMEOUT, |every| {
+            (every / KEEP_ALIVE_SHARE).clamp(ANSWER_TIMEOUT_MIN, ANSWER_TIMEOUT)
+        })
+    }
+
+    /// Reads the available bytes, or waits a moment.
+    pub(super) fn read_some(&mut self) -> Result<(), RemoteError> {
+        let mut bytes = [0; 16_384];
+        match self.stream.read(&mut bytes) {
+            Ok(0) => Err(RemoteError::Line(io::ErrorKind::UnexpectedEof.into())),
+            Ok(count) => {
+                self.input.extend_from_slice(&bytes[..count]);
+                Ok(())
+            }
+            Err(error) => match error.kind() {
+                io::ErrorKind::TimedOut | io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted => Ok(()),
+                _ => Err(error.into()),
+            },
+        }
+    }
+
+    /// The next reply among the bytes read; events before it are queued. Damaged frames are skipped: the request
+    /// is repeated.
+    pub(super) fn next_reply(&mut self) -> Result<Option<Reply>, RemoteError> {
+        let input = std::mem::take(&mut self.input);
+        for (index, &byte) in input.iter().enumerate() {
+            let frame = match self.decoder.push(byte) {
+                None => continue,
+                Some(Err(_)) => {
+                    self.is_damaged = true;
+                    continue;
+                }
+                Some(Ok(frame)) => frame,
+            };
+            let Ok(reply) = read_reply(frame.payload) else {
+                continue;
+            };
+            match reply {
+                Reply::Samples { event, samples } => {
+                    let samples = samples.iter().map(|record| Event::Sample(record.0));
+                    self.events.take(event, samples.collect());
+                }
+                Reply::PassDigest { event, pass } => self.events.take(event, vec![Event::Pass(pass)]),
+                Reply::Room { event, room } => {
+                    self.has_room(room);
+                    self.events.take(event, Vec::new());
+                }
+                Reply::Halted(status) => self.events.take(status.events, vec![Event::Halted(status)]),
+                answer => {
+                    self.input = input[index + 1..].to_vec();
+                    return Ok(Some(answer));
+                }
+            }
+        }
+        Ok(None)
+    }
+}
+
+/// Number of the request that a reply answers.
+fn answered(reply: &Reply) -> Option<u16> {
+    match reply {
+        Reply::Capabilities(capabilities) => Some(capabilities.number),
+        Reply::Ack { number }
+        | Reply::Nak { number, .. }
+        | Reply::Status { number, .. }
+        | Reply::Profile { number, .. }
+        | Reply::Motion { number, .. }
+        | Reply::Offsets { number, .. }
+        | Reply::Journal { number, .. }
+        | Reply::StoredJob { number, .. } => Some(*number),
+        Reply::Samples { .. } | Reply::PassDigest { .. } | Reply::Room { .. } | Reply::Halted(_) => None,
+    }
+}
