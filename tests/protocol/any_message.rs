@@ -12,7 +12,7 @@ use protocol::message::{
     SAMPLES_MAX, SafetyStatus, SampleRecord, SpindleOrder, Status, StreamStatus, Turning, Words,
 };
 
-use super::{reasons, requests};
+use super::examples::{reasons, requests};
 
 fn place() -> impl Strategy<Value = SpanParameter> {
     let fraction = prop_oneof![Just(0), Just(u64::MAX), any::<u64>()];
