@@ -30,7 +30,7 @@ use super::events::Received;
 pub use super::events::{Event, LineLosses};
 use super::feed::Feed;
 
-/// A line to a board. Reading returns [`io::ErrorKind::TimedOut`] or [`io::ErrorKind::WouldBlock`] after some
+/// A line to a board. Reading returns [`std::io::ErrorKind::TimedOut`] or [`std::io::ErrorKind::WouldBlock`] after some
 /// milliseconds without a byte.
 pub trait Stream: Read + Write + Send {
     /// Whether the other end is a process of this machine: its end ends the line, so that it is waited for as long as it lives.
