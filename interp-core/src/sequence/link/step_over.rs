@@ -1,28 +1,22 @@
-//! Links from pass to pass, each from rest to rest in closed form ([`Curve`]): straight moves off the surface, or a step-over along the boundary on
-//! the surface.
+//! A step-over from the end of a pass to the start of the next, on the surface, along the boundary.
 
-use crate::fault::{Fault, FaultKind, Result};
+use super::{NOTHING_NM, Progress, distance, to_mm};
+use crate::fault::Result;
 use crate::feed::curve::{Curve, CurveCursor, CurveLimits};
 use crate::feed::limits::{MotionLimits, SLOPE_MIN};
-use crate::feed::pace::{Course as _, Pace};
+use crate::feed::pace::Course as _;
 use crate::feed::profile::Profiles;
 use crate::feed::stations::{Derivatives, WINDOW, Window};
-use crate::feed::to_q10;
 use crate::job::AxisLimits;
 use crate::job::program::Job;
 use crate::math::arith::sqrt;
-use crate::math::number::{Bounded, MM_PER_NM, cube_root, to_f32};
+use crate::math::number::{Bounded, cube_root, to_f32};
 use crate::pass::offset::Located;
 use crate::pass::patch::Patch;
 use crate::pass::position::PassPosition;
 use crate::pass::schedule;
 use crate::sample::SpanParameter;
 use crate::sequence::lookahead::{check_crease, check_travel};
-
-/// Links up to this length, nm, are omitted: the rounding difference of one position computed twice.
-const NOTHING_NM: i64 = 2;
-/// Places of the centre above one contact that are farther apart, nm, differ by more than the rounding of their normals.
-const ELSEWHERE_NM: i64 = 20;
 
 /// Shares of the acceleration that a bend of a step-over may take.
 const BEND_SHARE: f32 = 0.5;
@@ -38,200 +32,6 @@ const JUMP_JERK_SHARE: f32 = 0.1;
 
 /// Rounds in which the speed of a step-over and what its bends leave are adapted to each other.
 const ROUNDS: u8 = 3;
-
-/// Progress along a link.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Progress {
-    curve: Curve,
-    cursor: CurveCursor,
-    length_q10: i64,
-    whole: Whole,
-    pace: Pace<CurveCursor>,
-}
-
-/// A length of which parts are taken: the shift that scales it to 31 bits, and the inverse of that, units of 2^-61. A division of 64 bits takes some hundred cycles.
-#[derive(Clone, Copy, Debug)]
-struct Whole {
-    up: u32,
-    down: u32,
-    inverse: i64,
-}
-
-impl Whole {
-    const NONE: Self = Self {
-        up: 0,
-        down: 0,
-        inverse: 0,
-    };
-
-    fn new(whole: i64) -> Self {
-        let zeros = whole.leading_zeros();
-        let (up, down) = (zeros.saturating_sub(33).min(30), 33_u32.saturating_sub(zeros));
-        Self {
-            up,
-            down,
-            inverse: (1_i64 << 61).checked_div((whole << up) >> down).unwrap_or(0),
-        }
-    }
-
-    /// A part below the whole as a fraction in units of 2^-30, with an error of at most 2^-29: 0.2 nm in 100 mm.
-    fn part_q30(&self, part: i64) -> i64 {
-        (((part << self.up) >> self.down) * self.inverse) >> 31
-    }
-}
-
-impl Progress {
-    const NONE: Self = Self {
-        curve: Curve::NONE,
-        cursor: CurveCursor::START,
-        length_q10: 0,
-        whole: Whole::NONE,
-        pace: Pace::REST,
-    };
-
-    fn lead(&mut self, length: f32, curve: Curve) {
-        self.cursor = curve.start();
-        self.curve = curve;
-        self.length_q10 = to_q10(length);
-        self.whole = Whole::new(self.length_q10);
-        self.pace = Pace::REST;
-    }
-
-    /// The motion along the link.
-    pub(crate) const fn curve(&self) -> &Curve {
-        &self.curve
-    }
-
-    /// Begins at this pace.
-    pub(crate) fn begin(&mut self, pace: f32, period: f32) {
-        self.pace.begin(pace, period);
-    }
-
-    /// One period; returns whether the end is reached.
-    pub(crate) fn tick(&mut self, pace: f32, is_fault: bool, period: f32, profiles: &mut Profiles) -> bool {
-        self.pace.want(pace, is_fault);
-        let pace = self.pace.tick(profiles);
-        self.curve.advance(&mut self.cursor, pace * period);
-        self.is_over()
-    }
-
-    pub(crate) fn is_over(&self) -> bool {
-        self.curve.is_over(&self.cursor)
-    }
-
-    pub(crate) fn is_at_rest(&self) -> bool {
-        self.pace.is_at_rest()
-    }
-
-    /// Where the next period ends, if nothing else is wanted until then.
-    fn next(&self, pace: f32, period: f32) -> CurveCursor {
-        let mut cursor = self.cursor;
-        self.curve.advance(&mut cursor, pace * period);
-        cursor
-    }
-
-    /// Whether a change of the pace is sought.
-    pub(crate) fn has_work(&self) -> bool {
-        self.pace.has_work()
-    }
-
-    /// One place of the search for a change of the pace.
-    pub(crate) fn work(&mut self, profiles: &mut Profiles) {
-        self.pace.work(&self.curve, &self.cursor, profiles);
-    }
-
-    /// Speed along the link, mm/s.
-    pub(crate) fn speed(&self) -> f32 {
-        self.pace.now() * self.curve.speed(&self.cursor)
-    }
-}
-
-/// A straight move.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct StraightMove {
-    pub(crate) progress: Progress,
-    from: [i32; 3],
-    to: [i32; 3],
-}
-
-impl StraightMove {
-    /// No move.
-    pub(crate) const NONE: Self = Self {
-        progress: Progress::NONE,
-        from: [0; 3],
-        to: [0; 3],
-    };
-
-    /// Becomes a move from point to point whose last `slow_mm` does not exceed `feed_mm_s`; returns whether its length is more than negligible. In
-    /// place, because a copy costs more than the rest.
-    pub(crate) fn lead(
-        &mut self,
-        from: [i32; 3],
-        to: [i32; 3],
-        slow_mm: f32,
-        feed_mm_s: f32,
-        axes: &AxisLimits,
-    ) -> bool {
-        let mut apart = [0_i64; 3];
-        for ((apart, from), to) in apart.iter_mut().zip(&from).zip(&to) {
-            *apart = i64::from(*to) - i64::from(*from);
-        }
-        if apart.iter().all(|apart| apart.abs() <= NOTHING_NM) {
-            return false;
-        }
-        let mm = apart.map(to_mm);
-        let [x, y, z] = mm;
-        let length = sqrt(x * x + y * y + z * z);
-        let mut limits = CurveLimits {
-            speed: f32::MAX,
-            acceleration: f32::MAX,
-            jerk: f32::MAX,
-        };
-        let axis = axes
-            .velocity_mm_s
-            .iter()
-            .zip(&axes.acceleration_mm_s2)
-            .zip(&axes.jerk_mm_s3)
-            .zip(&mm);
-        for (((v, a), j), mm) in axis {
-            let slope = 1.0 / (mm / length).abs().at_least(SLOPE_MIN);
-            limits.speed = limits.speed.at_most(v * slope);
-            limits.acceleration = limits.acceleration.at_most(a * slope);
-            limits.jerk = limits.jerk.at_most(j * slope);
-        }
-        self.progress
-            .lead(length, Curve::new(length, &limits, slow_mm, feed_mm_s));
-        (self.from, self.to) = (from, to);
-        true
-    }
-
-    /// The position.
-    pub(crate) fn position(&self) -> [i32; 3] {
-        self.position_at(&self.progress.cursor)
-    }
-
-    /// The position at a place of its curve.
-    pub(crate) fn position_at(&self, cursor: &CurveCursor) -> [i32; 3] {
-        let Progress {
-            curve,
-            length_q10,
-            whole,
-            ..
-        } = &self.progress;
-        if curve.is_over(cursor) || cursor.moved_q10 >= *length_q10 {
-            return self.to;
-        }
-        let part = whole.part_q30(cursor.moved_q10);
-        let mut at = self.from;
-        for (at, to) in at.iter_mut().zip(&self.to) {
-            // 32 bits times 30 bits fits 64.
-            let apart = i64::from(*to) - i64::from(*at);
-            let nm = (apart * part + (1 << 29)) >> 30;
-            *at = i32::try_from(i64::from(*at) + nm).unwrap_or(*at);
-        }
-        at
-    }
-}
 
 /// What the planning of a step-over does next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -693,35 +493,4 @@ impl BoundaryStepOver {
     pub(crate) fn contact_speed(&self) -> f32 {
         self.contact_ratio * self.progress.speed()
     }
-}
-
-/// Whether a link off the surface can begin and end here.
-///
-/// # Errors
-/// [`FaultKind::LinkBlocked`] where the surface does not face up.
-pub(crate) fn check_faces_up(up: bool) -> Result<()> {
-    if up {
-        Ok(())
-    } else {
-        Err(Fault::new(FaultKind::LinkBlocked, 0.0))
-    }
-}
-
-/// Whether two places of the centre above one contact differ by more than rounding.
-pub(crate) fn is_elsewhere(from: &[i32; 3], to: &[i32; 3]) -> bool {
-    let mut pairs = from.iter().zip(to);
-    pairs.any(|(from, to)| (i64::from(*to) - i64::from(*from)).abs() > ELSEWHERE_NM)
-}
-
-fn distance(from: &[i32; 3], to: &[i32; 3]) -> f32 {
-    let mut sum = 0.0;
-    for (from, to) in from.iter().zip(to) {
-        let mm = to_mm(i64::from(*to) - i64::from(*from));
-        sum += mm * mm;
-    }
-    sqrt(sum)
-}
-
-fn to_mm(nm: i64) -> f32 {
-    to_f32(nm) * MM_PER_NM
 }
