@@ -254,11 +254,7 @@ impl Planner {
 
     /// One piece of work.
     pub(crate) fn work(&mut self, plan: &mut Plan, deadlines: Deadlines) {
-        let least = if deadlines.waits {
-            deadlines.least.min(self.usual_periods())
-        } else {
-            deadlines.least
-        };
+        let least = deadlines.least.min(self.usual_periods());
         self.stage = match self.stage {
             Stage::Walk => {
                 let waits = deadlines.waits;
@@ -400,20 +396,24 @@ impl Planner {
         }
     }
 
-    /// Periods that the planning of a plan like this one takes with as many nodes as are usual where the tool does not wait for it.
+    /// Periods that the planning of a plan like this one takes with as many nodes as are usual where the tool does not wait for it; the greatest number where it has
+    /// as many.
     fn usual_periods(&self) -> u32 {
-        let (nodes, before) = self.walker.usual();
-        let steps = f32::from(self.step) * (PERIODS_A_STEP * f32::from(nodes) + PERIODS_OF_STEP);
-        let periods = PERIODS_TO_STEPS + steps + PERIODS_A_PLACE * to_f32(self.periods);
-        before.saturating_add(u32::try_from(truncated(periods)).unwrap_or(u32::MAX))
+        let Some((nodes, before)) = self.walker.usual() else {
+            return u32::MAX;
+        };
+        let of_step = PERIODS_A_STEP * f32::from(nodes) + PERIODS_OF_STEP;
+        let check = PERIODS_A_PLACE * to_f32(self.periods);
+        let after = |steps: u8| to_f32(before) + PERIODS_TO_STEPS + f32::from(steps) * of_step + check;
+        // The next one takes about as many steps as it has time for, from the fewest on, and has time for one more.
+        let most = (to_f32(self.periods) + of_step).at_least(after(STEPS_FIRST));
+        let periods = after(self.step).at_most(most);
+        u32::try_from(truncated(periods)).unwrap_or(u32::MAX)
     }
 
     /// Steps that there is time for. A plan is slowed down to what its planning takes, so one that comes too late makes it slower; and the tool stands where
     /// the pass before is over first. With an end at speed the next plan has to be complete before the last stop. `lasts`: periods of the motion.
-    fn steps_left(&self, plan: &Plan, lasts: f32, deadlines: Deadlines) -> u16 {
-        let Deadlines {
-            least, left, waits, ..
-        } = deadlines;
+    fn steps_left(&self, plan: &Plan, lasts: f32, Deadlines { least, left, .. }: Deadlines) -> u16 {
         let is_between = plan.pinned() != [0; 2];
         let [fewest, most] = if is_between {
             [STEPS_LEAST, STEPS_AT_SPEED]
@@ -422,7 +422,7 @@ impl Planner {
         };
         let [fewest, most] = [fewest, most].map(|steps| f32::from(steps.saturating_sub(self.step)));
         let stop = if plan.goes_on() { PERIODS_OF_STOP } else { 0.0 };
-        let own = if least == 0 || waits {
+        let own = if least == 0 || self.walker.usual().is_some() {
             f32::MAX
         } else {
             lasts - stop - to_f32(least)

@@ -104,8 +104,8 @@ pub(crate) struct Walker {
     speeds: [f32; 2],
     mean: u16,
     tightened: f32,
-    /// As many intervals as leave the plan longer than its planning, and the periods of that when they were chosen.
-    usual: (u16, u32),
+    /// Where there are more intervals than leave the plan longer than its planning: as many as do, and the periods of that when they were chosen.
+    usual: Option<(u16, u32)>,
 }
 
 /// Lists of this stage.
@@ -144,7 +144,7 @@ impl Walker {
         speeds: [0.0; 2],
         mean: 0,
         tightened: 1.0,
-        usual: (0, 0),
+        usual: None,
     };
 
     /// `tightened`: share of the acceleration near an end at speed.
@@ -157,8 +157,8 @@ impl Walker {
         self.jerk = f32::MAX;
     }
 
-    /// As many intervals as leave the plan longer than its planning, and the least periods of that when they were chosen.
-    pub(crate) const fn usual(&self) -> (u16, u32) {
+    /// Where there are more intervals than leave the plan longer than its planning: as many as do, and the least periods of that when they were chosen.
+    pub(crate) const fn usual(&self) -> Option<(u16, u32)> {
         self.usual
     }
 

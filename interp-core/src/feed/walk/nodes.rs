@@ -53,7 +53,8 @@ impl Walker {
         self.mean_s = self.mean_s.at_least(4.0 * self.finest);
     }
 
-    /// As many intervals as are worth their planning, and no more than leave the plan longer than its planning, unless the tool waits for it.
+    /// As many intervals as are worth their planning, and no more than leave the plan longer than its planning, unless the tool waits for it and the
+    /// next one need not be hurried.
     pub(super) fn choose_intervals(&mut self, limits: &MotionLimits, least: u32, waits: bool) {
         let whole = |value: f32| u16::try_from(truncated(value.at_least(0.0))).unwrap_or(u16::MAX);
         let time = self.duration;
@@ -72,8 +73,9 @@ impl Walker {
             let planned = whole(left / node);
             let fewest = NODES_FEW.min(most);
             let usual = self.intervals.min(planned).max(fewest);
-            self.usual = (usual, least);
-            if !waits {
+            if waits && usual > fewest {
+                self.usual = Some((usual, least));
+            } else {
                 self.intervals = usual;
             }
         }

@@ -49,6 +49,8 @@ const PIECES_MAX: u32 = 36;
 /// the least pace.
 const WAIT_SHARE: f32 = 0.6;
 const WAIT_PACE_MIN: f32 = 0.02;
+/// Periods that the search for that change takes: with fewer left it would only delay the plan.
+const PERIODS_A_SEARCH: f32 = 30.0;
 
 /// Feed above that of a plan for which it is planned anew, as a ratio.
 const REPLANNED: f32 = 1.001;
@@ -479,6 +481,7 @@ impl Sequencer {
                 });
                 if let Some(left) = left
                     && self.wait_pace == f32::MAX
+                    && left > PERIODS_A_SEARCH
                 {
                     let needed = self.planner.least_left(&next.plan);
                     if needed > left {
