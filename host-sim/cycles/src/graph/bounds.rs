@@ -43,27 +43,27 @@ const BOUNDS: &[(&str, u32, &str)] = &[
     ),
     ("controller::step_output::StepOutput::turn", 3, "axes"),
     (
-        "interp_core::job::region::ScanLine::drop_passed",
+        "interp_core::job::region::scan_line::ScanLine::drop_passed",
         32,
         "edges that a line meets: CROSSINGS_MAX",
     ),
     (
-        "interp_core::job::region::ScanLine::keep",
+        "interp_core::job::region::scan_line::ScanLine::keep",
         17,
         "intervals of a line, and one more: CROSSINGS_MAX / 2 + 1",
     ),
     (
-        "interp_core::job::region::ScanLine::insert",
+        "interp_core::job::region::scan_line::ScanLine::insert",
         32,
         "crossings of a curve: CROSSINGS_MAX",
     ),
     (
-        "interp_core::job::region::ScanLine::meet",
+        "interp_core::job::region::scan_line::ScanLine::meet",
         32,
         "crossings of a line: CROSSINGS_MAX",
     ),
     (
-        "interp_core::job::region::ScanLine::take_in",
+        "interp_core::job::region::scan_line::ScanLine::take_in",
         32,
         "edges of a portion: TAKEN",
     ),
@@ -175,7 +175,7 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "pieces of a portion: PIECES_MAX",
     ),
     (
-        "interp_core::sequence::link::BoundaryStepOver::choose_curve",
+        "interp_core::sequence::link::step_over::BoundaryStepOver::choose_curve",
         3,
         "axes; rounds of the search for a speed: ROUNDS",
     ),
