@@ -27,6 +27,7 @@
 mod cell_motion;
 mod change;
 pub(crate) mod curve;
+pub(crate) mod deadlines;
 pub(crate) mod follow;
 mod knots;
 pub(crate) mod limits;

@@ -1,5 +1,6 @@
 //! Plans a path in portions: walk, barrier method, check.
 
+use super::deadlines::Deadlines;
 use super::limits::{FeedChange, MotionLimits};
 use super::lists::{LIST, Lists, draft, draft_mut};
 use super::newton::{self, Reach, Sweep};
@@ -108,20 +109,6 @@ enum Stage {
     Finish,
     /// Finds the last stop before the end.
     Gate,
-}
-
-/// What the time of a planning is held against, periods.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Deadlines {
-    /// Periods of the planning so far.
-    pub(crate) spent: u32,
-    /// Least duration of the plan: that of its planning so far, which the planning of the next one will take, too. 0 where the tool may wait for that.
-    pub(crate) least: u32,
-    /// What is left until the plan is needed. None where the tool may wait for it.
-    pub(crate) left: Option<f32>,
-    /// The tool waits for this plan off the surface, before the first pass: it has the nodes and steps that it is worth, and lasts as long as the usual
-    /// planning of the next one.
-    pub(crate) waits: bool,
 }
 
 /// The planning of one path.
@@ -257,11 +244,7 @@ impl Planner {
         let least = deadlines.least.min(self.usual_periods());
         self.stage = match self.stage {
             Stage::Walk => {
-                let waits = deadlines.waits;
-                if self
-                    .walker
-                    .work(&mut self.lists, plan, &self.limits, least, waits)
-                {
+                if self.walker.work(&mut self.lists, plan, &self.limits, deadlines) {
                     Stage::Weigh
                 } else {
                     Stage::Walk
@@ -405,8 +388,10 @@ impl Planner {
         let of_step = PERIODS_A_STEP * f32::from(nodes) + PERIODS_OF_STEP;
         let check = PERIODS_A_PLACE * to_f32(self.periods);
         let after = |steps: u8| to_f32(before) + PERIODS_TO_STEPS + f32::from(steps) * of_step + check;
-        // The next one takes about as many steps as it has time for, from the fewest on, and has time for one more.
-        let most = (to_f32(self.periods) + of_step).at_least(after(STEPS_FIRST));
+        // The next one takes about as many steps as it has time for, from the fewest on; one more where the last one here was cut short.
+        let is_short = self.step >= STEPS_MAX && self.reach.step() < WENT;
+        let more = if is_short { of_step } else { 0.0 };
+        let most = (to_f32(self.periods) + more).at_least(after(STEPS_FIRST));
         let periods = after(self.step).at_most(most);
         u32::try_from(truncated(periods)).unwrap_or(u32::MAX)
     }

@@ -4,11 +4,12 @@ use std::boxed::Box;
 use std::vec::Vec;
 
 use super::curve::{Curve, CurveLimits};
+use super::deadlines::Deadlines;
 use super::follow::Follower;
 use super::limits::MotionLimits;
 use super::pace::{Course, Pace};
 use super::plan::Plan;
-use super::planner::{Deadlines, Planner};
+use super::planner::Planner;
 use super::profile::Profiles;
 use super::stations::Station;
 use crate::job::AxisLimits;

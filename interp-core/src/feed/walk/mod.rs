@@ -5,6 +5,7 @@ mod means;
 mod nodes;
 mod speeds;
 
+use super::deadlines::Deadlines;
 use super::knots::find_knots;
 use super::limits::MotionLimits;
 use super::lists::Lists;
@@ -195,16 +196,14 @@ impl Walker {
         PORTION_LEAST + (cycles - PORTION_LEAST) * count / most
     }
 
-    /// One portion; whether the walk is complete. `least`: periods that the plan has to take at least, for the planning so far; `waits`: the tool waits
-    /// for it.
+    /// One portion; whether the walk is complete.
     #[inline(never)]
     pub(crate) fn work(
         &mut self,
         lists: &mut Lists,
         plan: &mut Plan,
         limits: &MotionLimits,
-        least: u32,
-        waits: bool,
+        deadlines: Deadlines,
     ) -> bool {
         let count = plan.stations.count();
         self.stage = match self.stage {
@@ -253,7 +252,7 @@ impl Walker {
                 self.forwards(lists, plan, self.index, end);
                 if end == last {
                     self.choose_mean(plan);
-                    self.choose_intervals(limits, least, waits);
+                    self.choose_intervals(limits, deadlines);
                 }
                 self.next(end, end == last, Stage::Forwards, Stage::Rests)
             }

@@ -1,6 +1,7 @@
 //! The number of nodes and their times: close together where the speed changes.
 
 use super::{ACCEL, BUSY, NODES, SPACING, SPEED_SQR, TIME, Vary, Walker};
+use crate::feed::deadlines::Deadlines;
 use crate::feed::limits::MotionLimits;
 use crate::feed::lists::{Lists, get, put};
 use crate::feed::node_times::NodeTimes;
@@ -55,7 +56,10 @@ impl Walker {
 
     /// As many intervals as are worth their planning, and no more than leave the plan longer than its planning, unless the tool waits for it and the
     /// next one need not be hurried.
-    pub(super) fn choose_intervals(&mut self, limits: &MotionLimits, least: u32, waits: bool) {
+    pub(super) fn choose_intervals(&mut self, limits: &MotionLimits, deadlines: Deadlines) {
+        let Deadlines {
+            least, left, waits, ..
+        } = deadlines;
         let whole = |value: f32| u16::try_from(truncated(value.at_least(0.0))).unwrap_or(u16::MAX);
         let time = self.duration;
         let most = whole(time / self.finest).clamp(NODES_LEAST, NODES_COUNT);
@@ -69,8 +73,9 @@ impl Walker {
                 (WALKED * time, PERIODS_A_PLAN + PERIODS_A_STOP, PERIODS_A_NODE)
             };
             let lasts = lasts / limits.period;
-            let left = lasts * (1.0 - PERIODS_A_PLACE) - plan - to_f32(i64::from(least));
-            let planned = whole(left / node);
+            let own = lasts - to_f32(i64::from(least));
+            let until = own.at_most(left.unwrap_or(f32::MAX));
+            let planned = whole((until - PERIODS_A_PLACE * lasts - plan) / node);
             let fewest = NODES_FEW.min(most);
             let usual = self.intervals.min(planned).max(fewest);
             if waits && usual > fewest {

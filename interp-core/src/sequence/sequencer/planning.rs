@@ -3,8 +3,9 @@
 use super::{Phase, Planning, Sequencer, both};
 use crate::fault::{Fault, FaultKind};
 use crate::feed::MM_PER_Q10;
+use crate::feed::deadlines::Deadlines;
 use crate::feed::limits::MotionLimits;
-use crate::feed::planner::{Deadlines, PORTION_CYCLES};
+use crate::feed::planner::PORTION_CYCLES;
 use crate::feed::turn::Turn;
 use crate::job::links::Link;
 use crate::job::program::{Job, Program};
@@ -49,8 +50,9 @@ const PIECES_MAX: u32 = 36;
 /// the least pace.
 const WAIT_SHARE: f32 = 0.6;
 const WAIT_PACE_MIN: f32 = 0.02;
-/// Periods that the search for that change takes: with fewer left it would only delay the plan.
+/// Periods that the search for that change takes: with fewer left it would only delay the plan; and those by which that may be late without it.
 const PERIODS_A_SEARCH: f32 = 30.0;
+const PERIODS_LATE: f32 = 8.0;
 
 /// Feed above that of a plan for which it is planned anew, as a ratio.
 const REPLANNED: f32 = 1.001;
@@ -484,7 +486,7 @@ impl Sequencer {
                     && left > PERIODS_A_SEARCH
                 {
                     let needed = self.planner.least_left(&next.plan);
-                    if needed > left {
+                    if needed > left + PERIODS_LATE {
                         self.wait_pace = (WAIT_SHARE * left / needed).at_least(WAIT_PACE_MIN);
                     }
                 }
