@@ -3,6 +3,8 @@
 mod motion;
 
 use crate::command::Inputs;
+#[cfg(doc)]
+use crate::fault::FaultKind;
 use crate::fault::{Fault, Result};
 use crate::job::stream::{RecordCopy, RowsNeeded};
 use crate::job::{Header, STORE_WORDS};
