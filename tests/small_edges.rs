@@ -150,3 +150,17 @@ fn limits_hold_where_the_curvature_jumps() {
         assert!(took.iter().all(|time_s| *time_s < 1.2), "{name}: {took:?}");
     }
 }
+
+/// The centre's path bends within a patch of 0.3 mm, into which the ball hardly fits: with one cell there 1.39 of the jerk limit, on a face of a real part 2.04.
+#[test]
+fn limits_hold_where_the_ball_hardly_fits() {
+    let text = include_str!("golden/hardly_fits.toml");
+    let job = job_file::parse("hardly_fits", text).unwrap();
+    let Used { shares, stand, .. } = used(&job);
+    let [velocity, acceleration, jerk] = shares;
+    assert!(
+        velocity <= 1.001 && acceleration <= 1.0 && jerk <= 1.02,
+        "{shares:?}"
+    );
+    assert!(stand <= 20, "{stand} periods");
+}

@@ -115,10 +115,12 @@ pub(crate) struct Lookahead {
     looks: u16,
     cells: u16,
     cell_fraction: u64,
-    /// Mean length of a patch of the last pass, mm, or the greatest by the way of the centre around an edge; whether there was one. The greatest so far.
+    /// Mean length of a patch of the last pass, mm, or the greatest by the way of the centre around an edge; the greatest of those so far.
     patch_mm: f32,
-    has_edge: bool,
     centre_mm: f32,
+    /// Whether the centre's path bent much more than the contact's on the last pass, and so far.
+    has_bend: bool,
+    bends: bool,
     /// Whether the curvature jumped at a patch boundary of the last pass, and so far.
     has_jump: bool,
     jumps: bool,
@@ -176,8 +178,9 @@ impl Lookahead {
         cells: 1,
         cell_fraction: 0,
         patch_mm: 0.0,
-        has_edge: false,
         centre_mm: 0.0,
+        has_bend: false,
+        bends: false,
         has_jump: false,
         jumps: false,
         bend: [0.0; 3],
@@ -204,7 +207,7 @@ impl Lookahead {
     pub(crate) const fn restart(&mut self) {
         self.line = None;
         (self.patch_mm, self.pass_mm) = (0.0, 0.0);
-        (self.has_edge, self.has_jump) = (false, false);
+        (self.has_bend, self.has_jump) = (false, false);
         self.without = 0;
         self.whole = None;
         self.task = Task::Done;
@@ -264,7 +267,7 @@ impl Lookahead {
         out.pass = pass;
         out.route = route;
         out.cells = 0;
-        (self.centre_mm, self.jumps) = (0.0, false);
+        (self.centre_mm, self.bends, self.jumps) = (0.0, false, false);
         (out.point, out.is_tip) = (false, false);
         out.full_pace = 1.0;
         out.next = None;
@@ -472,7 +475,7 @@ impl Lookahead {
         let patches = f32::from(self.patches.saturating_add(1));
         self.pass_mm = to_f32(self.start_q10 - out.head_q10) * MM_PER_Q10;
         self.patch_mm = (self.pass_mm / patches).at_least(self.centre_mm);
-        (self.has_edge, self.has_jump) = (self.centre_mm > 0.0, self.jumps);
+        (self.has_bend, self.has_jump) = (self.bends, self.jumps);
         let header = job.header;
         out.interval = interval_of(self.maximum.inv_interval_sq);
         if let Some(route) = lines.take(header) {

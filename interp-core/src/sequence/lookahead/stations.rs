@@ -28,6 +28,8 @@ const CELLS_TO_REST: u16 = 4;
 
 /// Share of the centre's way that counts as length of a patch.
 const CENTRE_SHARE: f32 = 0.5;
+/// Share of the contact's way below which the centre's is that of a ball which hardly fits.
+const HARDLY_FITS: f32 = 0.5;
 
 /// Change of 1 - r k from patch to patch below which it is rounding of single precision.
 const NO_JUMP: f32 = 4e-6;
@@ -51,6 +53,8 @@ impl Lookahead {
         if by_centre > length {
             self.centre_mm = self.centre_mm.at_least(by_centre);
         }
+        // Where it hardly fits, the centre's path bends as much.
+        self.bends |= by_centre > length || centre < HARDLY_FITS * length;
         let length = length.at_least(by_centre);
         if out.cells == 0 {
             let [start, end] = out.route.ends;
@@ -78,8 +82,8 @@ impl Lookahead {
                 length
             };
             out.cells = whole(mean / CELL_KEPT_MM).clamp(1, fit);
-            if self.patch_mm == 0.0 || self.has_edge || self.centre_mm > 0.0 {
-                // The patches of a first pass are not known yet, and around an edge derivatives change within a patch.
+            if self.patch_mm == 0.0 || self.has_bend || self.bends {
+                // The patches of a first pass are not known yet, and in bends derivatives change within a patch.
                 out.cells = out.cells.max(CELLS_MANY.min(fit));
             }
             if self.has_jump {

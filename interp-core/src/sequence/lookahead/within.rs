@@ -18,7 +18,7 @@ pub(super) struct WholePass {
     maximum: PassMaximum,
     patch_mm: f32,
     pass_mm: f32,
-    has_edge: bool,
+    has_bend: bool,
     has_jump: bool,
 }
 
@@ -44,7 +44,7 @@ impl Lookahead {
             maximum: self.maximum,
             patch_mm: self.patch_mm,
             pass_mm: self.pass_mm,
-            has_edge: self.has_edge,
+            has_bend: self.has_bend,
             has_jump: self.has_jump,
         });
         route.begin_at(path);
@@ -57,7 +57,7 @@ impl Lookahead {
         self.whole = None;
         self.maximum = whole.maximum;
         (self.patch_mm, self.pass_mm) = (whole.patch_mm, whole.pass_mm);
-        (self.has_edge, self.has_jump) = (whole.has_edge, whole.has_jump);
+        (self.has_bend, self.has_jump) = (whole.has_bend, whole.has_jump);
         out.interval = whole.interval;
         (out.next, out.steps_over, out.is_last) = (whole.next, whole.steps_over, whole.is_last);
         self.finish_short(out);
