@@ -137,9 +137,10 @@ impl Advance {
         if excess > 0 {
             self.measure_again(table);
         }
-        // The front is lowered where its ball is, of the part that is made.
+        // The front is lowered at the crest, and where its ball is, of the part that is made.
         let [from, to] = self.within;
         let foot = self.search.foot().min(to.saturating_sub(1)).max(from);
+        self.note_excess(table, self.mark_of(self.station), excess);
         self.note_excess(table, foot, excess);
         self.end_crest(job, table);
     }
