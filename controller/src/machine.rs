@@ -158,7 +158,7 @@ pub trait Machine {
     /// How far the last run came; none where none was journalled. Takes some milliseconds.
     fn journal(&mut self) -> Option<Journal>;
 
-    /// Journals how far a run came. Takes 0.2 ms, in which a tick is delayed by 16 us, 100 at most.
+    /// Journals how far a run came. Takes 0.2 ms, and is held back where a word would delay a tick.
     ///
     /// # Errors
     /// The storage cannot be written, or is full until the next power-up.

@@ -10,7 +10,7 @@ use machine::remote::{RemoteError, Session, drive};
 use protocol::digest::job_digest;
 use protocol::message::{JobName, Reason, Request, job_mark};
 
-use super::emulated::Emulated;
+use super::emulated::{CYCLES_US, Emulated};
 use super::settings::session;
 
 /// Operations between two failures of the supply: those of two rounds or so, and no multiple of a job's, so that each failure is at another place.
@@ -239,4 +239,23 @@ fn a_supply_that_fails_while_jobs_are_stored_leaves_whole_ones() {
         bench.cuts,
         ended.report["flash_erased"]
     );
+}
+
+/// A job's words are written between the ticks, none of which is delayed.
+#[test]
+fn words_delay_no_tick() {
+    let emulated = Emulated::start(&SKR_PRO, &[]);
+    let job = job(1);
+    let mut link = session(&emulated, 1);
+    for _ in 0..3 {
+        store(&mut link, &job, "part").unwrap();
+    }
+    drop(link);
+    let ended = emulated.end();
+    ended.no_complaint();
+    let written = 3 * job.words.len() as u64;
+    assert!(ended.number("flash_operations") >= written, "{written}");
+    let latency = ended.report["tim2"]["latency_max_cycles"].as_u64().unwrap();
+    println!("{written} words, {latency} cycles");
+    assert!(latency < 10 * CYCLES_US, "{latency} cycles");
 }

@@ -106,8 +106,7 @@ pub(crate) fn init(device: pac::Peripherals) -> Board {
 }
 
 /// Settings, journal and jobs are kept in the chip's flash.
-pub(crate) use crate::drivers::flash::{JobFlash, SettingsFlash};
-pub(crate) type FallingFlash = SettingsFlash;
+pub(crate) use crate::drivers::flash::{FallingFlash, JobFlash, SettingsFlash};
 pub(crate) const HAS_JOURNAL: bool = true;
 /// The safety inputs are pins.
 pub(crate) use crate::drivers::gpio::Ports as InputPorts;

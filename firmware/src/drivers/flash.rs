@@ -2,11 +2,14 @@
 //!
 //! The chip has one bank: while a word is written (16 us, 100 at most) or a sector erased (1 s, 2 s at most) the processor waits at its next fetch from flash. So
 //! records are written word by word, a stall each, and sectors are erased before the first tick. A word is written with interrupts off, from the unlocking of the registers to
-//! their locking: the supply's interrupt may write another at any time, and nothing is lost, because no interrupt could be fetched meanwhile. Words need 2.7 V.
+//! their locking: the supply's interrupt may write another at any time, and nothing is lost, because no interrupt could be fetched meanwhile. All but that interrupt begin a word
+//! only where the slowest is written before the next tick is due: a tick that came late would set the pins of its directions too late. Words need 2.7 V.
 //! `memory.x` leaves these sectors out of the image's region.
 
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
 use stm32f4xx_hal::pac;
+
+use crate::{board::TIMER_HZ, drivers::sample_timer::counts_left};
 
 /// First sector and its address; a chip of 1 MB has twelve sectors, the last seven of this size.
 const SETTINGS: u8 = 10;
@@ -26,6 +29,8 @@ const LOCK: u32 = 1 << 31;
 /// Errors in `FLASH_SR`, taken back by writing them.
 const ERRORS: u32 = 0xf2;
 const BUSY: u32 = 1 << 16;
+/// The slowest write of a word with what is done around it, in counts of the sample timer: 100 us and 10.
+const WORD_COUNTS: u32 = TIMER_HZ / 1_000_000 * 110;
 
 /// Bytes of a word.
 const WORD: usize = 4;
@@ -58,23 +63,25 @@ fn operate(flash: &pac::FLASH, control: u32, start: impl FnOnce()) -> Result<(),
     })
 }
 
-/// Two sectors as a flash of their own, from this one on.
-pub struct Sectors<const FIRST: u8>(pac::FLASH);
+/// Two sectors as a flash of their own, from this one on. Urgent: words are not held back before a tick.
+pub struct Sectors<const FIRST: u8, const URGENT: bool>(pac::FLASH);
 
 /// Those of the settings and the journal.
-pub(crate) type SettingsFlash = Sectors<SETTINGS>;
+pub(crate) type SettingsFlash = Sectors<SETTINGS, false>;
+/// The same, for the record of a failing supply.
+pub(crate) type FallingFlash = Sectors<SETTINGS, true>;
 /// Those of the jobs.
-pub(crate) type JobFlash = Sectors<JOBS>;
+pub(crate) type JobFlash = Sectors<JOBS, false>;
 
 /// The sectors of settings and of jobs, and those of the settings once more, for the record of a failing supply.
 #[allow(unsafe_code, reason = "one peripheral has all of them")]
-pub(crate) fn sectors(flash: pac::FLASH) -> (SettingsFlash, JobFlash, SettingsFlash) {
+pub(crate) fn sectors(flash: pac::FLASH) -> (SettingsFlash, JobFlash, FallingFlash) {
     // SAFETY: each operation is complete, and the registers locked, before interrupts are on again.
     let again = || unsafe { pac::FLASH::steal() };
     (Sectors(flash), Sectors(again()), Sectors(again()))
 }
 
-impl<const FIRST: u8> Sectors<FIRST> {
+impl<const FIRST: u8, const URGENT: bool> Sectors<FIRST, URGENT> {
     const BEGIN: u32 = LARGE_BEGIN + (FIRST as u32 - FIRST_LARGE) * SECTOR;
     const BYTES: u32 = 2 * SECTOR;
 
@@ -90,11 +97,11 @@ impl<const FIRST: u8> Sectors<FIRST> {
     }
 }
 
-impl<const FIRST: u8> ErrorType for Sectors<FIRST> {
+impl<const FIRST: u8, const URGENT: bool> ErrorType for Sectors<FIRST, URGENT> {
     type Error = FlashError;
 }
 
-impl<const FIRST: u8> ReadNorFlash for Sectors<FIRST> {
+impl<const FIRST: u8, const URGENT: bool> ReadNorFlash for Sectors<FIRST, URGENT> {
     const READ_SIZE: usize = 1;
 
     #[allow(unsafe_code, reason = "memory that changes by itself")]
@@ -122,7 +129,7 @@ impl<const FIRST: u8> ReadNorFlash for Sectors<FIRST> {
     }
 }
 
-impl<const FIRST: u8> NorFlash for Sectors<FIRST> {
+impl<const FIRST: u8, const URGENT: bool> NorFlash for Sectors<FIRST, URGENT> {
     const WRITE_SIZE: usize = WORD;
     const ERASE_SIZE: usize = SECTOR as usize;
 
@@ -155,11 +162,17 @@ impl<const FIRST: u8> NorFlash for Sectors<FIRST> {
         }
         for (address, word) in (begin..).step_by(WORD).zip(words) {
             let word = u32::from_le_bytes(*word);
-            // SAFETY: within the sectors; the registers are set to write words.
-            #[allow(unsafe_code, reason = "a write to flash")]
-            operate(&self.0, PG | WORDS, || unsafe {
-                core::ptr::with_exposed_provenance_mut::<u32>(address as usize).write_volatile(word);
-            })?;
+            while !cortex_m::interrupt::free(|_| {
+                let may_write = URGENT || counts_left() >= WORD_COUNTS;
+                // SAFETY: within the sectors; the registers are set to write words.
+                #[allow(unsafe_code, reason = "a write to flash")]
+                if may_write {
+                    operate(&self.0, PG | WORDS, || unsafe {
+                        core::ptr::with_exposed_provenance_mut::<u32>(address as usize).write_volatile(word);
+                    })?;
+                }
+                Ok(may_write)
+            })? {}
         }
         Ok(())
     }
