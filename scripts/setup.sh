@@ -67,7 +67,7 @@ END
     chmod +x $place/rs274
     # Runs a program of one block to check the unpacked interpreter, which writes its parameters into the working directory.
     (cd $place && : > empty.tbl && : > empty.var && printf 'G1X1F1\nM2\n' > probe.ngc &&
-        ./rs274 -t empty.tbl -v empty.var -g probe.ngc < /dev/null 2> /dev/null | grep -q STRAIGHT_FEED) ||
+        HOME=$PWD ./rs274 -t empty.tbl -v empty.var -g probe.ngc < /dev/null 2> /dev/null | grep -q STRAIGHT_FEED) ||
         die "linuxcnc-uspace was unpacked into $place, but its rs274 does not run"
 }
 

@@ -88,6 +88,8 @@ fn interpret(program: &str) -> Vec<Move> {
     let output = Command::new(interpreter())
         .args(["-t", "tool.tbl", "-v", "parameters.var", "-g", "program.ngc"])
         .current_dir(folder.path())
+        // It maps a file of its tools there into memory; a second interpreter would truncate it meanwhile.
+        .env("HOME", folder.path())
         .stdin(Stdio::null())
         .output()
         .expect("LinuxCNC's rs274 is needed: ./check brings it in, or install the package linuxcnc-uspace");
@@ -95,7 +97,8 @@ fn interpret(program: &str) -> Vec<Move> {
     let errors = String::from_utf8_lossy(&output.stderr);
     assert!(
         output.status.success() && canonical.contains("PROGRAM_END()"),
-        "{errors}"
+        "{}: {errors}",
+        output.status
     );
     moves(&canonical)
 }

@@ -87,6 +87,8 @@ fn interpret(path: &Path, text: &str) -> Result<String, MotionError> {
     let output = Command::new(interpreter())
         .args(["-t", "tool.tbl", "-v", "parameters.var", "-g", "program.ngc"])
         .current_dir(folder.path())
+        // It maps a file of its tools there into memory; a second interpreter would truncate it meanwhile.
+        .env("HOME", folder.path())
         .stdin(Stdio::null())
         .output()
         .map_err(failed)?;
@@ -98,7 +100,7 @@ fn interpret(path: &Path, text: &str) -> Result<String, MotionError> {
     let said = said
         .lines()
         .rfind(|line| !matches!(line.trim(), "" | "executing"));
-    let said = said.unwrap_or("no message");
+    let said = said.map_or_else(|| output.status.to_string(), str::to_owned);
     Err(MotionError::new(
         format!("{name}: rs274 refuses the program: {said}"),
         "correct the program; it must end with M2 or M30",
