@@ -8,6 +8,7 @@ use boards::SKR_PRO;
 
 use super::emulated::{Emulated, sim};
 use super::machine::{MACHINE, PROFILE};
+use super::settings::session;
 
 /// A surface of 20 x 6 mm, some passes of it.
 const JOB: &str = "[surface]
@@ -76,6 +77,8 @@ impl Bench {
     }
 
     fn home(&self) {
+        // After a cut the board may erase a sector before it answers: on a busy machine for longer than the tool's patience.
+        drop(session(&self.emulated, 1));
         self.operate(&["on"]);
         self.operate(&["home"]);
     }
