@@ -155,8 +155,21 @@ fn limits_hold_where_the_curvature_jumps() {
 #[test]
 fn limits_hold_where_the_ball_hardly_fits() {
     let text = include_str!("golden/hardly_fits.toml");
-    let job = job_file::parse("hardly_fits", text).unwrap();
-    let Used { shares, stand, .. } = used(&job);
+    hold_limits(&job_file::parse("hardly_fits", text).unwrap());
+}
+
+/// Passes begin 14 um before a knot: cells of 2 um, over which derivatives are rounding, make the jumps at the other knots no less certain. They were left out: 4.25 of the jerk
+/// limit, on a face of a real part 1.48.
+#[test]
+fn limits_hold_behind_a_short_piece() {
+    let text = include_str!("golden/hardly_fits.toml");
+    let short = text.replace("[[0.02, 0.0], [0.98, 0.0],", "[[0.02, 0.295], [0.98, 0.295],");
+    assert_ne!(short, text);
+    hold_limits(&job_file::parse("hardly_fits", &short).unwrap());
+}
+
+fn hold_limits(job: &Job) {
+    let Used { shares, stand, .. } = used(job);
     let [velocity, acceleration, jerk] = shares;
     assert!(
         velocity <= 1.001 && acceleration <= 1.0 && jerk <= 1.02,

@@ -9,7 +9,7 @@
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
 use stm32f4xx_hal::pac;
 
-use crate::{board::TIMER_HZ, drivers::sample_timer::counts_left};
+use crate::board::TIMER_HZ;
 
 /// First sector and its address; a chip of 1 MB has twelve sectors, the last seven of this size.
 const SETTINGS: u8 = 10;
@@ -42,6 +42,25 @@ pub struct FlashError;
 impl NorFlashError for FlashError {
     fn kind(&self) -> NorFlashErrorKind {
         NorFlashErrorKind::Other
+    }
+}
+
+/// Counts of the sample timer, TIM2, until the next tick is due; 0 while one is.
+#[allow(unsafe_code, reason = "registers of a timer that the sample task owns")]
+fn counts_left() -> u32 {
+    // SAFETY: reading them changes nothing.
+    let timer = unsafe { pac::TIM2::steal() };
+    let left = timer
+        .arr()
+        .read()
+        .arr()
+        .bits()
+        .saturating_sub(timer.cnt().read().cnt().bits());
+    // Read after the count: a tick that has become due since then was near.
+    if timer.sr().read().uif().bit_is_set() {
+        0
+    } else {
+        left
     }
 }
 

@@ -21,21 +21,6 @@ const fn is_past(count: u32, now: u32) -> bool {
     now.wrapping_sub(count) <= u32::MAX / 2
 }
 
-/// Counts of TIM2 until the next tick is due; 0 while one is.
-#[allow(unsafe_code, reason = "registers of a timer that the sample task owns")]
-pub(crate) fn counts_left() -> u32 {
-    // SAFETY: reading them changes nothing.
-    let timer = unsafe { pac::TIM2::steal() };
-    let left = timer
-        .arr()
-        .read()
-        .arr()
-        .bits()
-        .saturating_sub(timer.cnt().read().cnt().bits());
-    // Read after the count: a tick that has become due since then was near.
-    if timer.sr().read().uif().bit_is_set() { 0 } else { left }
-}
-
 /// Both timers and the timing of the last period.
 pub(crate) struct SampleTimer {
     timer: pac::TIM2,

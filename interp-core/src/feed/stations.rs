@@ -29,7 +29,9 @@ pub(crate) struct Station {
 pub(crate) struct Stations {
     list: [Station; STATIONS_MAX],
     count: u16,
-    /// Least length of a cell that derivatives were taken over, mm.
+    /// Cells that derivatives were taken over in the one behind each station; 0 where they were taken over others.
+    parts: [u8; STATIONS_MAX],
+    /// Least length of those others, mm.
     spacing: f32,
 }
 
@@ -49,6 +51,7 @@ impl Stations {
     pub(crate) const NONE: Self = Self {
         list: [Station::NONE; STATIONS_MAX],
         count: 0,
+        parts: [0; STATIONS_MAX],
         spacing: 0.0,
     };
 
@@ -57,15 +60,16 @@ impl Stations {
         self.spacing = f32::MAX;
     }
 
-    /// Derivatives are taken over cells of this length, mm.
+    /// Derivatives are taken over cells of this length, mm, which are no parts of those between stations.
     pub(crate) fn note_spacing(&mut self, mm: f32) {
         self.spacing = self.spacing.at_most(mm);
     }
 
-    /// Appends a station; ignored where the list is full.
-    pub(crate) fn push(&mut self, station: Station) {
-        if let Some(place) = self.list.get_mut(usize::from(self.count)) {
-            *place = station;
+    /// Appends a station; ignored where the list is full. `parts`: cells that derivatives are taken over in the one behind it; 0 where they are taken over others.
+    pub(crate) fn push(&mut self, station: Station, parts: u8) {
+        let count = usize::from(self.count);
+        if let (Some(place), Some(of_cell)) = (self.list.get_mut(count), self.parts.get_mut(count)) {
+            (*place, *of_cell) = (station, parts);
             self.count += 1;
         }
     }
@@ -111,9 +115,18 @@ impl Stations {
         station + 1 < self.count && self.get(station).arc_nm == self.get(station + 1).arc_nm
     }
 
-    /// The jump at a station, less what rounding can make of it.
+    /// Length of what derivatives were taken over in a cell, mm.
+    fn spacing_in(&self, cell: u16) -> f32 {
+        match self.parts.get(usize::from(cell)) {
+            None | Some(0) => self.spacing,
+            Some(parts) => self.cell_mm(cell) / f32::from(*parts),
+        }
+    }
+
+    /// The jump at a station, less what rounding can make of it in the cells beside it.
     pub(crate) fn jump(&self, station: u16) -> Jump {
-        let inverse = 1.0 / self.spacing.at_least(1e-3);
+        let before = self.spacing_in(station.saturating_sub(1));
+        let inverse = 1.0 / before.at_most(self.spacing_in(station + 1)).at_least(1e-3);
         let noise = [FIRST_NOISE * inverse, SECOND_NOISE * inverse * inverse];
         let mut jump = [[0.0; 2]; 3];
         let sides = self.get(station).q.iter().zip(&self.get(station + 1).q);

@@ -124,10 +124,11 @@ impl Path {
             for station in 0..=cells {
                 let part = station as f64 / cells as f64;
                 let s = self.ends[piece] + part * (self.ends[piece + 1] - self.ends[piece]);
-                plan.stations.push(Station {
+                let station = Station {
                     arc_nm: (s * 1e6).round() as u32,
                     q: [0, 1, 2].map(|axis| [1, 2, 3].map(|order| (self.of)(piece, s, order)[axis] as f32)),
-                });
+                };
+                plan.stations.push(station, 0);
             }
         }
         let mut planner = Box::new(Planner::IDLE);

@@ -106,7 +106,6 @@ impl Lookahead {
         };
         self.cells = out.cells * self.looks;
         self.cell_fraction = part(self.cells);
-        out.plan.stations.note_spacing(length / f32::from(self.cells));
     }
 
     /// Lengths of the contact's and of the centre's way over the patch, roughly, mm; 0 where its surface is not evaluated.
@@ -304,19 +303,24 @@ impl Lookahead {
         let stations = &mut out.plan.stations;
         let q = stations.back_mut(1).map_or([[0.0; 3]; 3], |last| last.q);
         let begins = self.station == 0 && self.patches.is_multiple_of(out.group);
+        let parts = if self.is_on_front() {
+            0
+        } else {
+            u8::try_from(self.looks.saturating_mul(out.group)).unwrap_or(u8::MAX)
+        };
         if out.group > 1 {
             if begins {
                 let station = Station {
                     arc_nm,
                     q: [[0.0; 3]; 3],
                 };
-                stations.push(station);
-                stations.push(station);
+                stations.push(station, parts);
+                stations.push(station, parts);
             } else if let Some(last) = stations.back_mut(1) {
                 last.arc_nm = arc_nm;
             }
         } else if self.station == 0 || self.is_kept() {
-            stations.push(Station { arc_nm, q });
+            stations.push(Station { arc_nm, q }, parts);
         }
     }
 

@@ -271,7 +271,7 @@ impl Lookahead {
         if let Some(missed) = self.missed.take() {
             widen(&mut station.q, &missed, false);
         }
-        out.plan.stations.push(station);
+        out.plan.stations.push(station, 0);
     }
 
     /// Stations that may be kept besides those at the stretches' ends: one of each piece that is left, two where a knot is crossed.

@@ -142,10 +142,11 @@ impl Lookahead {
         } else {
             u32::try_from(out.tail_q10 >> Q10_BITS).unwrap_or(0)
         };
-        out.plan.stations.push(Station {
+        let station = Station {
             arc_nm: from_nm.saturating_add(self.turn.station_nm(index)),
             q: self.turn.station(second, index),
-        });
+        };
+        out.plan.stations.push(station, 0);
     }
 
     /// Begins to look for a turn where there may be one. `rows`: those of the last passes.
