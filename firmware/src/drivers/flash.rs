@@ -181,16 +181,21 @@ impl<const FIRST: u8, const URGENT: bool> NorFlash for Sectors<FIRST, URGENT> {
         }
         for (address, word) in (begin..).step_by(WORD).zip(words) {
             let word = u32::from_le_bytes(*word);
-            while !cortex_m::interrupt::free(|_| {
-                let may_write = URGENT || counts_left() >= WORD_COUNTS;
+            let write = || {
                 // SAFETY: within the sectors; the registers are set to write words.
                 #[allow(unsafe_code, reason = "a write to flash")]
+                operate(&self.0, PG | WORDS, || unsafe {
+                    core::ptr::with_exposed_provenance_mut::<u32>(address as usize).write_volatile(word);
+                })
+            };
+            // Held back until the slowest write ends before the next tick; the tick comes between two looks.
+            while !cortex_m::interrupt::free(|_| {
+                let may_write = URGENT || counts_left() >= WORD_COUNTS;
                 if may_write {
-                    operate(&self.0, PG | WORDS, || unsafe {
-                        core::ptr::with_exposed_provenance_mut::<u32>(address as usize).write_volatile(word);
-                    })?;
+                    write().map(|()| true)
+                } else {
+                    Ok(false)
                 }
-                Ok(may_write)
             })? {}
         }
         Ok(())
