@@ -42,14 +42,14 @@ impl Piece {
         cruise_q10: 0,
     };
 
-    fn new(from: f32, to: f32, limits: &CurveLimits, cruise: f32) -> Self {
+    fn new(from: f32, to: f32, limits: &CurveLimits, cruise_q10: i64) -> Self {
         let [jerk_s, ramp_s] = ramp(from - to, limits);
         Self {
             from,
             to,
             jerk_s,
             ramp_s,
-            cruise_q10: to_q10(cruise.at_least(0.0)),
+            cruise_q10: cruise_q10.max(0),
         }
     }
 
@@ -138,6 +138,11 @@ fn ramp_length(from: f32, to: f32, limits: &CurveLimits) -> f32 {
     0.5 * (from + to) * ramp_s
 }
 
+/// The same in units of 2^-10 nm, in which lengths are added: in f32 half a metre is rounded to 60 nm, by which a move would end too early.
+fn ramp_length_q10(from: f32, to: f32, limits: &CurveLimits) -> i64 {
+    to_q10(ramp_length(from, to, limits))
+}
+
 /// Speed that is reached at most on this length from rest to rest.
 fn peak_speed(length: f32, limits: &CurveLimits) -> f32 {
     let CurveLimits {
@@ -168,10 +173,10 @@ fn planned(machine: &CurveLimits) -> CurveLimits {
 
 /// From rest to rest over a length, mm, with this peak of the speed.
 fn there_and_back(length: f32, peak: f32, limits: &CurveLimits) -> [Piece; 2] {
-    let cruise = length - 2.0 * ramp_length(0.0, peak, limits);
+    let cruise_q10 = to_q10(length) - 2 * ramp_length_q10(0.0, peak, limits);
     [
-        Piece::new(0.0, peak, limits, cruise),
-        Piece::new(peak, 0.0, limits, 0.0),
+        Piece::new(0.0, peak, limits, cruise_q10),
+        Piece::new(peak, 0.0, limits, 0),
     ]
 }
 
@@ -222,11 +227,14 @@ impl Curve {
                 top = low;
             }
             // Where even the slow speed is not reached on the fast part, it is cruised at from there on.
-            let cruise = fast - needed(top);
+            let slow_q10 = to_q10(slow);
+            let ramps_q10 = ramp_length_q10(0.0, top, &limits) + ramp_length_q10(top, slow_speed, &limits);
+            let cruise_q10 = to_q10(length) - slow_q10 - ramps_q10;
+            let slow_cruise_q10 = slow_q10 - ramp_length_q10(slow_speed, 0.0, &limits) + cruise_q10.min(0);
             let pieces = [
-                Piece::new(0.0, top, &limits, cruise),
-                Piece::new(top, slow_speed, &limits, slow - last + cruise.at_most(0.0)),
-                Piece::new(slow_speed, 0.0, &limits, 0.0),
+                Piece::new(0.0, top, &limits, cruise_q10),
+                Piece::new(top, slow_speed, &limits, slow_cruise_q10),
+                Piece::new(slow_speed, 0.0, &limits, 0),
                 Piece::NONE,
             ];
             (pieces, 2)
@@ -430,5 +438,36 @@ impl Curve {
 
     const fn is_last(&self, piece: u8) -> bool {
         piece >= self.last
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LIMITS: CurveLimits = CurveLimits {
+        speed: 100.0,
+        acceleration: 1000.0,
+        jerk: 20_000.0,
+    };
+
+    /// What a motion is short of its length, or beyond it, is a step of the position where it ends.
+    #[test]
+    fn long_moves_end_where_they_should() {
+        for (length, slow) in [
+            (576.371, 0.0),
+            (1234.567, 2.0),
+            (3999.9, 0.0),
+            (87.3, 5.0),
+            (8.0, 0.0),
+        ] {
+            let curve = Curve::new(length, &LIMITS, slow, 20.0);
+            let mut cursor = curve.start();
+            while !curve.is_over(&cursor) {
+                curve.advance(&mut cursor, 1e-3);
+            }
+            let off_nm = (cursor.moved_q10 - to_q10(length)) >> 10;
+            assert!(off_nm.abs() <= 8, "{length} mm: {off_nm} nm off");
+        }
     }
 }
