@@ -250,6 +250,7 @@ impl Curve {
     }
 
     /// A curve of two pieces, and after its rest a further length, mm, to another rest.
+    #[inline(never)]
     pub(crate) fn and_then(self, length: f32) -> Self {
         let limits = planned(&self.limits);
         let [up, down, ..] = self.pieces;

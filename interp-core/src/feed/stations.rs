@@ -1,6 +1,7 @@
 //! Stations of a path: its derivatives at places in order, two stations at each patch boundary.
 
 use super::{MM_PER_Q10, Q10_BITS};
+use crate::math::arith::truncated;
 use crate::math::number::{Bounded, MM_PER_NM, nm_to_mm};
 
 /// Greatest number of stations of a path.
@@ -29,8 +30,10 @@ pub(crate) struct Station {
 pub(crate) struct Stations {
     list: [Station; STATIONS_MAX],
     count: u16,
-    /// Cells that derivatives were taken over in the one behind each station; 0 where they were taken over others.
-    parts: [u8; STATIONS_MAX],
+    /// Cells between the stations of a patch, whose [`parts_of_cell`] derivatives were taken over, and patches of which the outer stations are kept; no cells where derivatives were
+    /// taken over others.
+    cells: u16,
+    group: u16,
     /// Least length of those others, mm.
     spacing: f32,
 }
@@ -39,6 +42,30 @@ pub(crate) struct Stations {
 /// at the end of a window.
 const FIRST_NOISE: f32 = 2e-6;
 const SECOND_NOISE: f32 = 12e-6;
+
+/// Least length of a cell, mm: a shorter one has differences of rounded positions.
+pub(crate) const CELL_MIN_MM: f32 = 0.15;
+
+/// Length of a cell that derivatives are good to, mm, and fewest cells for them: a patch has its own second derivative.
+pub(crate) const CELL_FINE_MM: f32 = 0.25;
+pub(crate) const CELLS_FINE: u16 = 4;
+
+/// Most cells that derivatives are taken over for one between stations.
+pub(crate) const PARTS_MAX: u16 = 32;
+
+/// Cells between the stations of a patch that are fine as they are.
+pub(crate) const CELLS_MANY: u16 = 8;
+
+/// Parts of each of the cells of a patch of this length, mm, that derivatives are taken over.
+pub(crate) fn parts_of_cell(length: f32, cells: u16) -> u16 {
+    if cells >= CELLS_MANY {
+        return 1;
+    }
+    let whole = |value: f32| u16::try_from(truncated(value)).unwrap_or(u16::MAX);
+    let fine = whole(length / CELL_FINE_MM).max(CELLS_FINE);
+    let most = whole(length / CELL_MIN_MM).max(2);
+    fine.min(most).div_ceil(cells.max(1)).clamp(1, PARTS_MAX)
+}
 
 impl Station {
     const NONE: Self = Self {
@@ -51,13 +78,20 @@ impl Stations {
     pub(crate) const NONE: Self = Self {
         list: [Station::NONE; STATIONS_MAX],
         count: 0,
-        parts: [0; STATIONS_MAX],
+        cells: 0,
+        group: 1,
         spacing: 0.0,
     };
 
     pub(crate) const fn clear(&mut self) {
         self.count = 0;
+        self.cells = 0;
         self.spacing = f32::MAX;
+    }
+
+    /// Derivatives are taken over the parts of the cells between stations: of so many in a patch, or of a patch where those of a group are kept together.
+    pub(crate) const fn note_cells(&mut self, cells: u16, group: u16) {
+        (self.cells, self.group) = (cells, group);
     }
 
     /// Derivatives are taken over cells of this length, mm, which are no parts of those between stations.
@@ -65,11 +99,10 @@ impl Stations {
         self.spacing = self.spacing.at_most(mm);
     }
 
-    /// Appends a station; ignored where the list is full. `parts`: cells that derivatives are taken over in the one behind it; 0 where they are taken over others.
-    pub(crate) fn push(&mut self, station: Station, parts: u8) {
-        let count = usize::from(self.count);
-        if let (Some(place), Some(of_cell)) = (self.list.get_mut(count), self.parts.get_mut(count)) {
-            (*place, *of_cell) = (station, parts);
+    /// Appends a station; ignored where the list is full.
+    pub(crate) fn push(&mut self, station: Station) {
+        if let Some(place) = self.list.get_mut(usize::from(self.count)) {
+            *place = station;
             self.count += 1;
         }
     }
@@ -117,10 +150,11 @@ impl Stations {
 
     /// Length of what derivatives were taken over in a cell, mm.
     fn spacing_in(&self, cell: u16) -> f32 {
-        match self.parts.get(usize::from(cell)) {
-            None | Some(0) => self.spacing,
-            Some(parts) => self.cell_mm(cell) / f32::from(*parts),
+        if self.cells == 0 {
+            return self.spacing;
         }
+        let length = self.cell_mm(cell) / f32::from(self.group);
+        length / f32::from(parts_of_cell(length * f32::from(self.cells), self.cells))
     }
 
     /// The jump at a station, less what rounding can make of it in the cells beside it.

@@ -128,7 +128,7 @@ impl Path {
                     arc_nm: (s * 1e6).round() as u32,
                     q: [0, 1, 2].map(|axis| [1, 2, 3].map(|order| (self.of)(piece, s, order)[axis] as f32)),
                 };
-                plan.stations.push(station, 0);
+                plan.stations.push(station);
             }
         }
         let mut planner = Box::new(Planner::IDLE);

@@ -225,6 +225,11 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "halvings of the stations: CELL_BISECTIONS",
     ),
     (
+        "interp_core::feed::stations::Stations::is_jump",
+        168,
+        "stations that are looked through: STATIONS_MAX",
+    ),
+    (
         "interp_core::feed::stations::Window::derivatives",
         5,
         "positions of a derivative: WINDOW",

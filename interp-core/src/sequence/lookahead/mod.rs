@@ -10,7 +10,7 @@ mod turn_search;
 mod within;
 
 use crate::fault::{Fault, FaultKind, Result};
-use crate::feed::stations::{Derivatives, STATIONS_MAX, Station, Window};
+use crate::feed::stations::{CELL_FINE_MM, Derivatives, STATIONS_MAX, Station, Window};
 use crate::feed::turn::{self, Turn, TurnEnd};
 use crate::feed::{MM_PER_Q10, to_q10};
 use crate::job::program::Job;
@@ -169,7 +169,7 @@ impl Lookahead {
         begun: 0,
         halvings: 0,
         is_coarse: false,
-        cell_mm: stations::CELL_FINE_MM,
+        cell_mm: CELL_FINE_MM,
         least_mm: STRETCH_MIN_MM,
         pass_mm: 0.0,
         station: 0,

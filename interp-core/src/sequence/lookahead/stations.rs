@@ -2,7 +2,7 @@
 
 use super::{CELL_KEPT_MM, Lookahead, PATCHES, PassPlan, Task, check_crease, check_travel, stations_of};
 use crate::fault::{Fault, FaultKind, Result};
-use crate::feed::stations::{Derivatives, Station, WINDOW};
+use crate::feed::stations::{CELLS_MANY, Derivatives, Station, WINDOW, parts_of_cell};
 use crate::job::program::Job;
 use crate::job::{AxisLimits, Spacing, SurfaceKind};
 use crate::math::arith::{fraction_to_f32, sqrt, truncated};
@@ -11,18 +11,6 @@ use crate::pass::step_over::{PassMaximum, StepOverEstimator};
 use crate::sequence::link::is_elsewhere;
 use crate::surface::{Contact, PathSpeed};
 
-/// Least length of a cell, mm: a shorter one has differences of rounded positions.
-pub(super) const CELL_MIN_MM: f32 = 0.15;
-
-/// Length of a cell that derivatives are good to, mm, and fewest cells for them: a patch has its own second derivative.
-pub(super) const CELL_FINE_MM: f32 = 0.25;
-pub(super) const CELLS_FINE: u16 = 4;
-
-/// Most cells that are looked at for one between kept stations.
-pub(super) const LOOKS_MAX: u16 = 32;
-
-/// Cells between kept stations of a patch that are fine as they are.
-const CELLS_MANY: u16 = 8;
 /// Cells of a patch at least, where the curvature jumps at its ends.
 const CELLS_TO_REST: u16 = 4;
 
@@ -97,13 +85,8 @@ impl Lookahead {
             out.cell_fraction = u64::MAX.checked_div(u64::from(out.cells)).unwrap_or(u64::MAX);
             out.group = spans.div_ceil(PATCHES);
         }
-        let fine = whole(length / CELL_FINE_MM).max(CELLS_FINE);
-        let most = whole(length / CELL_MIN_MM).max(2);
-        self.looks = if out.cells >= CELLS_MANY {
-            1
-        } else {
-            fine.min(most).div_ceil(out.cells.max(1)).clamp(1, LOOKS_MAX)
-        };
+        self.looks = parts_of_cell(length, out.cells);
+        out.plan.stations.note_cells(out.cells, out.group);
         self.cells = out.cells * self.looks;
         self.cell_fraction = part(self.cells);
     }
@@ -303,24 +286,19 @@ impl Lookahead {
         let stations = &mut out.plan.stations;
         let q = stations.back_mut(1).map_or([[0.0; 3]; 3], |last| last.q);
         let begins = self.station == 0 && self.patches.is_multiple_of(out.group);
-        let parts = if self.is_on_front() {
-            0
-        } else {
-            u8::try_from(self.looks.saturating_mul(out.group)).unwrap_or(u8::MAX)
-        };
         if out.group > 1 {
             if begins {
                 let station = Station {
                     arc_nm,
                     q: [[0.0; 3]; 3],
                 };
-                stations.push(station, parts);
-                stations.push(station, parts);
+                stations.push(station);
+                stations.push(station);
             } else if let Some(last) = stations.back_mut(1) {
                 last.arc_nm = arc_nm;
             }
         } else if self.station == 0 || self.is_kept() {
-            stations.push(Station { arc_nm, q }, parts);
+            stations.push(Station { arc_nm, q });
         }
     }
 

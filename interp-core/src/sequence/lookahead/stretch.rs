@@ -1,11 +1,10 @@
 //! Stretches of a pass on a front: pieces of one path span, together long enough for differences.
 
 use super::stations::widen;
-use super::stations::{CELL_FINE_MM, CELL_MIN_MM, CELLS_FINE, LOOKS_MAX};
 use super::{Lookahead, PATCHES, PassPlan, STATIONS, STRETCH_MIN_MM, Task};
 use crate::fault::Result;
 use crate::feed::limits::{AxisMotion, MotionLimits};
-use crate::feed::stations::{Derivatives, Station, Window};
+use crate::feed::stations::{CELL_FINE_MM, CELL_MIN_MM, CELLS_FINE, Derivatives, PARTS_MAX, Station, Window};
 use crate::feed::{Q10_BITS, to_q10};
 use crate::job::AxisLimits;
 use crate::job::program::Job;
@@ -142,7 +141,7 @@ impl Lookahead {
         self.looks = if self.is_short {
             1
         } else {
-            fine.min(most).clamp(1, LOOKS_MAX)
+            fine.min(most).clamp(1, PARTS_MAX)
         };
         self.cells = self.looks;
         let part = end.saturating_sub(start).checked_div(u64::from(self.cells));
@@ -271,7 +270,7 @@ impl Lookahead {
         if let Some(missed) = self.missed.take() {
             widen(&mut station.q, &missed, false);
         }
-        out.plan.stations.push(station, 0);
+        out.plan.stations.push(station);
     }
 
     /// Stations that may be kept besides those at the stretches' ends: one of each piece that is left, two where a knot is crossed.

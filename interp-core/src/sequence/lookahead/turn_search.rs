@@ -146,7 +146,7 @@ impl Lookahead {
             arc_nm: from_nm.saturating_add(self.turn.station_nm(index)),
             q: self.turn.station(second, index),
         };
-        out.plan.stations.push(station, 0);
+        out.plan.stations.push(station);
     }
 
     /// Begins to look for a turn where there may be one. `rows`: those of the last passes.
