@@ -175,7 +175,7 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "pieces of a portion: PIECES_MAX",
     ),
     (
-        "interp_core::sequence::link::step_over::BoundaryStepOver::choose_curve",
+        "interp_core::sequence::link::step_over::BoundaryStepOver::left_at",
         3,
         "axes; rounds of the search for a speed: ROUNDS",
     ),
