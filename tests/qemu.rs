@@ -171,6 +171,14 @@ fn region() {
     machine::links::add(&mut with_links, &links);
     assert!(with_links.header.links > 10);
     let curved = job("fan_region");
+    let from_middle = {
+        let path = format!("{}/../jobs/fan_region.toml", env!("CARGO_MANIFEST_DIR"));
+        let mut job = job_file::load(path.as_ref()).unwrap();
+        (job.spacing, job.scallop_mm) = (Spacing::Constant(Start::Middle), 0.1);
+        let (job, prepared) = machine::direction::choose(job).unwrap();
+        assert!(job.region.is_some_and(|region| region.cells.len() > 1));
+        prepared
+    };
     let mut curved_with_links = curved.clone();
     machine::links::add(&mut curved_with_links, &links);
     compare_prepared(&[
@@ -179,6 +187,7 @@ fn region() {
         ("region with links", with_links),
         ("fan_region", curved),
         ("fan_region with links", curved_with_links),
+        ("fan_region from the middle, in cells", from_middle),
         coarse_torus(),
     ]);
 }

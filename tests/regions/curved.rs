@@ -19,10 +19,11 @@ fn random_regions() {
     for seed in seeds {
         let job = random_job(seed, true);
         let about = format!(
-            "seed {seed}: {:?} {:?} {:?}, {} loops",
+            "seed {seed}: {:?} {:?} {:?} {:?}, {} loops",
             job.machine.has_limits(),
             job.along,
             job.pattern,
+            job.spacing,
             job.region.as_ref().unwrap().loops.len()
         );
         let job = match machine::direction::choose(job) {
@@ -60,9 +61,14 @@ fn random_regions() {
 /// A region that is the whole surface has the passes of the whole surface, but for the rounding of the lines.
 #[test]
 fn the_whole_surface_as_a_region() {
-    for name in ["freeform", "torus"] {
+    for (name, start) in [
+        ("freeform", Start::Edge),
+        ("torus", Start::Edge),
+        ("freeform", Start::Middle),
+        ("torus", Start::Middle),
+    ] {
         let mut job = load(name);
-        (job.spacing, job.scallop_mm) = (Spacing::Constant(Start::Edge), 0.05);
+        (job.spacing, job.scallop_mm) = (Spacing::Constant(start), 0.05);
         job.machine.limits = None;
         let without = follow(&job);
         let [[u0, u1], [v0, v1]] = job.surface.domain();

@@ -3,7 +3,9 @@
 //! Independent of the machine's integers: it knows only that these round places to 2^-21 of a patch, or finer.
 
 use super::contact::Oracle;
-use job::{Along, Region};
+use super::smooth::SmoothParameter;
+use super::verify::START_SHARE;
+use job::{Along, Region, Spacing, Start};
 
 /// A place of the machine, as a share of the longest span between two knots: the machine's patches are those or shorter.
 const PLACE_SHARE: f64 = 1.0 / 2_097_152.0;
@@ -123,11 +125,40 @@ impl Oracle {
         }
     }
 
-    /// Whether a pass that starts here is on the first line with an interval.
+    /// Whether a pass that starts here is on the first line with an interval, or from the middle on the line there.
     pub(super) fn is_first_line(&self, [path, side]: [f64; 2]) -> bool {
         let [first, _] = self.pass_range();
         let is_on = |region: &RegionEdges| region.is_on(path, side);
-        self.region.as_ref().is_none_or(is_on) && self.is_empty_between(first, side)
+        let is_line = if self.starts_in_middle() {
+            self.is_middle_line(side)
+        } else {
+            self.is_empty_between(first, side)
+        };
+        self.region.as_ref().is_none_or(is_on) && is_line
+    }
+
+    fn starts_in_middle(&self) -> bool {
+        self.spacing == Spacing::Constant(Start::Middle)
+    }
+
+    /// Whether a line is in the middle between the first and the last one, or the next one above it with an interval. Where the region is so narrow that a pass
+    /// is not certain, the first and the last line, and so the middle, are known between bounds only.
+    fn is_middle_line(&self, side: f64) -> bool {
+        let Some([first, last]) = self.outer_lines() else {
+            return false;
+        };
+        let [least, most] = self.pass_range();
+        let smooth = SmoothParameter::new(self, self.across());
+        let middle = |from: f64, to: f64| smooth.own(0.5 * (smooth.of(from) + smooth.of(to))).0;
+        let [low, high] = self.side_range();
+        let near = START_SHARE * (high - low);
+        side >= middle(least, last) - near && self.is_empty_between(middle(first, most) + near, side)
+    }
+
+    /// The first and the last line with an interval, if there is one.
+    fn outer_lines(&self) -> Option<[f64; 2]> {
+        let [least, _] = self.pass_range();
+        Some([self.next_line(least)?, self.last_line()])
     }
 
     /// The region's boundary as lines of (u, v), `parts` points an edge; none where the job has none.
@@ -226,25 +257,38 @@ impl Oracle {
         self.region.is_none() || cells.any(|region| region.contains([path, side]) || region.is_on(path, side))
     }
 
-    /// Whether a curved pass may begin or end here: on the boundary of a cell, or at its last line, above which only slivers are left.
-    pub(super) fn is_end(&self, path: f64, side: f64, last_lines: &[f64]) -> bool {
-        let near = self.near_side();
-        self.cells.iter().zip(last_lines).any(|(cell, last)| {
-            cell.is_on(path, side) || (side >= last - near && cell.contains([path, side]))
+    /// Whether a curved pass may begin or end here: on the boundary of a cell, or at a line that passes go to, beyond which only slivers are left.
+    pub(super) fn is_end(&self, path: f64, side: f64, outer: &[Option<[f64; 2]>]) -> bool {
+        let is_beyond = |lines: &[f64; 2]| self.is_at_last(side, *lines);
+        self.cells.iter().zip(outer).any(|(cell, lines)| {
+            cell.is_on(path, side) || (lines.as_ref().is_some_and(is_beyond) && cell.contains([path, side]))
         })
     }
 
-    /// The last line of each cell; infinite where that holds no pass.
-    pub(super) fn last_lines(&self) -> Vec<f64> {
+    /// Whether a place is at the last line, or beyond it; from the middle at the first one, too.
+    fn is_at_last(&self, side: f64, [first, last]: [f64; 2]) -> bool {
+        let near = self.near_side();
+        side >= last - near || (self.starts_in_middle() && side <= first + near)
+    }
+
+    /// Whether the last pass of a cell may be here: on the last line, or from the middle on the first one.
+    pub(super) fn is_last_of_cell(&self, side: f64, [first, last]: [f64; 2]) -> bool {
+        let near = self.near_side();
+        if self.starts_in_middle() {
+            side <= first + near
+        } else {
+            side >= last - near
+        }
+    }
+
+    /// The first and the last line of each cell; none where that holds no pass.
+    pub(super) fn outer_lines_of_cells(&self) -> Vec<Option<[f64; 2]>> {
         let cells = (0..self.cells.len()).map(|index| self.of_cell(index));
         cells
             .map(|cell| {
                 let [first, last] = cell.pass_range();
-                if cell.is_empty_between(first, last) {
-                    f64::INFINITY
-                } else {
-                    cell.last_line()
-                }
+                let is_empty = cell.is_empty_between(first, last);
+                cell.outer_lines().filter(|_| !is_empty)
             })
             .collect()
     }

@@ -49,7 +49,7 @@ pub struct SampleCheck {
 }
 
 /// Distance of the first pass from the middle of the side parameter at most, a share of the parameter: its rounding.
-const START_SHARE: f64 = 1e-6;
+pub(super) const START_SHARE: f64 = 1e-6;
 
 /// Accumulates a [`AccuracyReport`] from a stream of samples.
 #[derive(Clone, Debug)]
@@ -64,8 +64,8 @@ pub struct Verifier {
     current: Option<PassState>,
     /// Ends of the passes on the current line of a region.
     on_line: Vec<[f64; 2]>,
-    /// Of curved passes in a region, the last line of each cell.
-    last_lines: Vec<f64>,
+    /// Of curved passes in a region, the first and the last line of each cell.
+    outer_lines: Vec<Option<[f64; 2]>>,
 }
 
 /// State of the current pass.
@@ -108,8 +108,8 @@ impl Verifier {
             report,
             current: None,
             on_line: Vec::new(),
-            last_lines: if oracle.spacing.is_constant() && oracle.region.is_some() {
-                oracle.last_lines()
+            outer_lines: if oracle.spacing.is_constant() && oracle.region.is_some() {
+                oracle.outer_lines_of_cells()
             } else {
                 Vec::new()
             },
@@ -166,8 +166,8 @@ impl Verifier {
             let [_, end] = self.oracle.outer_passes();
             self.report.last_on_boundary =
                 if self.oracle.spacing.is_constant() && self.oracle.region.is_some() {
-                    let last = self.last_lines.iter().rfind(|last| last.is_finite());
-                    last.is_none_or(|last| pass.side >= last - self.oracle.near_side())
+                    let lines = self.outer_lines.iter().flatten().last();
+                    lines.is_none_or(|lines| self.oracle.is_last_of_cell(pass.side, *lines))
                 } else if self.oracle.region.is_some() {
                     self.check_line(pass.side);
                     self.is_cell_done(pass.side) && self.cells_without_pass(self.cell_index + 1)
@@ -194,7 +194,7 @@ impl Verifier {
     /// Whether an end of a curved pass is on no boundary of the surface.
     fn is_off_curve(&self, path: f64, side: f64) -> bool {
         if self.oracle.region.is_some() {
-            return !self.oracle.is_end(path, side, &self.last_lines);
+            return !self.oracle.is_end(path, side, &self.outer_lines);
         }
         !self.oracle.path_range().contains(&path) && !self.oracle.side_range().contains(&side)
     }

@@ -126,18 +126,20 @@ fn smooth(
     Ok(widths)
 }
 
-/// Whether a region reaches to a last side boundary that is a single point.
+/// Whether a region reaches to a side boundary that is a single point, where its passes do not begin there.
 fn ends_on_point(job: &Job, prepared: &Prepared) -> bool {
-    let [_, is_point] = side_poles(job, prepared);
+    let Some(region) = &job.region else {
+        return false;
+    };
     let [us, vs] = job.surface.domain();
-    is_point
-        && job.region.as_ref().is_some_and(|region| {
-            let [of_u, of_v] = region.extent();
-            match job.along {
-                job::Along::U => of_v[1] >= vs[1],
-                job::Along::V => of_u[1] >= us[1],
-            }
-        })
+    let [of_u, of_v] = region.extent();
+    let ([first, last], [low, high]) = match job.along {
+        job::Along::U => (vs, of_v),
+        job::Along::V => (us, of_u),
+    };
+    let [is_first_point, is_last_point] = side_poles(job, prepared);
+    let begins_there = job.spacing == job::Spacing::Constant(job::Start::Edge);
+    is_last_point && high >= last || is_first_point && low <= first && !begins_there
 }
 
 /// Where passes from the edge begin: on the last side boundary where that alone is a single point.

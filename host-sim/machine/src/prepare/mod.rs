@@ -136,7 +136,6 @@ pub fn prepare(job: &Job) -> Result<Prepared, JobError> {
             "write start = \"edge\" or \"middle\", or call `direction::choose`",
         ));
     }
-    region::check_job(job)?;
     let sign = geometry::tool_sign(job)?;
     #[allow(clippy::cast_possible_truncation, reason = "the machine's own precision")]
     let header = Header {
@@ -148,6 +147,8 @@ pub fn prepare(job: &Job) -> Result<Prepared, JobError> {
         spacing: match job.spacing {
             job::Spacing::Exact => Spacing::Exact,
             job::Spacing::FirstOrder => Spacing::FirstOrder,
+            // Each cell of a region gives its direction.
+            job::Spacing::Constant(_) if job.region.is_some() => Spacing::Constant,
             job::Spacing::Constant(job::Start::Edge) => Spacing::Constant,
             job::Spacing::Constant(job::Start::Middle) => Spacing::ConstantFromMiddle,
         },

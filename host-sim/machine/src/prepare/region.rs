@@ -3,12 +3,15 @@
 //! Vertices are rounded to places of the path and the side parameter, 2^-21 of a span. The first and the last line are the first and the last that meet an interval
 //! that is long enough, so the machine finds a pass on both. A cell that holds no pass is left out.
 //!
-//! For passes of constant scallop height a place on the side parameter is a share of all of it, edges of constant side are kept, and a cell is cut off at its last line.
+//! For passes of constant scallop height a place on the side parameter is a share of all of it, edges of constant side are kept, and a cell is cut off at its last line, or
+//! parted at its middle line ([`curved`]).
+
+mod curved;
 
 use interp_core::job::region::{
     CROSSINGS_MAX, Edge, FRACTION_BITS, FRONT_SIDE_BITS, REGION_SPANS_MAX, front_side_starts,
 };
-use job::{Along, Job, JobError, Region, Spacing, Start};
+use job::{Along, Job, JobError, Region, Spacing};
 
 use super::geometry::SurfaceEvaluator;
 use super::{ParameterSpans, Prepared};
@@ -18,29 +21,12 @@ const LEAST_SHARE: f64 = 0.1;
 /// Points along and across each span at which the speed of the path parameter is taken.
 const SPEEDS: u32 = 9;
 
-/// Distance of the last line of curved passes from the end of the side parameter, at least: 6 nm in 100 mm.
-const BEFORE_END: i32 = 16;
 /// Sizes of places that differ by less, relatively, are the same: the rounding of spans of some thousand places.
 const SAME_SCALE: f64 = 1e-4;
 /// Widths of spans that differ by less, relatively, are the same: over 1024 spans it adds up to less than a place.
 const SAME_WIDTH: f64 = 1e-10;
 
 const KEY: &str = "region.loops";
-
-/// Refuses what passes of a region are not made for.
-///
-/// # Errors
-/// Passes of constant scallop height from the middle.
-pub(super) fn check_job(job: &Job) -> Result<(), JobError> {
-    if job.region.is_some() && job.spacing == Spacing::Constant(Start::Middle) {
-        return Err(job.origin.error(
-            "cut.start",
-            "passes of constant scallop height within a region begin on its edge",
-            "write start = \"edge\"",
-        ));
-    }
-    Ok(())
-}
 
 /// Adds the region's words; returns where its first pass starts, (u, v).
 ///
@@ -76,17 +62,24 @@ pub(super) fn add(job: &Job, region: &Region, prepared: &mut Prepared) -> Result
                 "let the passes run along the other parameter, or cut the region into several jobs",
             );
         }
-        let Some([first, last]) = lines(&edges, least) else {
+        let Some(lines) = lines(&edges, least) else {
             continue;
         };
-        let (edges, last) = sides.cut_off(edges, [first, last], least);
-        let from = intervals(&edges, first, least)
-            .first()
-            .map_or(0, |[from, _]| *from);
-        start.get_or_insert([parameter(&prepared.path, from), sides.parameter(first)]);
-        let count = i32::try_from(edges.len()).unwrap_or(i32::MAX);
-        records.push([count, first, last, least]);
-        records.extend(edges.into_iter().map(Edge::to_words));
+        let whole = Cell { edges, lines };
+        let cells = match job.spacing {
+            Spacing::Constant(start) => curved::cells(whole, start, least),
+            Spacing::Exact | Spacing::FirstOrder => vec![whole],
+        };
+        for Cell { edges, lines } in cells {
+            let [first, last] = lines;
+            let from = intervals(&edges, first, least)
+                .first()
+                .map_or(0, |[from, _]| *from);
+            start.get_or_insert([parameter(&prepared.path, from), sides.parameter(first)]);
+            let count = i32::try_from(edges.len()).unwrap_or(i32::MAX);
+            records.push([count, first, last, least]);
+            records.extend(edges.into_iter().map(Edge::to_words));
+        }
     }
     let Some([path, side]) = start else {
         return no(
@@ -106,6 +99,12 @@ pub(super) fn add(job: &Job, region: &Region, prepared: &mut Prepared) -> Result
         Along::U => [path, side],
         Along::V => [side, path],
     })
+}
+
+/// What is machined from a first line to a last one.
+struct Cell {
+    edges: Vec<Edge>,
+    lines: [i32; 2],
 }
 
 /// The edges in order, without those of constant side. Places are fractions of spans, so an edge is parted where it crosses a knot between spans of
@@ -214,48 +213,6 @@ impl<'a> SidePlaces<'a> {
             None => Edge::between(a, b),
         }
     }
-
-    /// For curved passes, the edges of what is below the last line, and that line: a little before the end of the side parameter, so that no rounding takes a pass beyond it.
-    fn cut_off(&self, edges: Vec<Edge>, [first, last]: [i32; 2], least: i32) -> (Vec<Edge>, i32) {
-        if self.ends.is_none() {
-            return (edges, last);
-        }
-        let mut last = last.min((1 << FRONT_SIDE_BITS) - BEFORE_END).max(first);
-        let mut back = 1;
-        loop {
-            let cut = Self::cut_above(&edges, last);
-            // Places are rounded anew where edges are cut: the line may be too short by one.
-            if last == first || !intervals(&cut, last, least).is_empty() {
-                return (cut, last);
-            }
-            last = (last - back).max(first);
-            back *= 2;
-        }
-    }
-
-    /// The edges of what is below a line and on it.
-    fn cut_above(edges: &[Edge], last: i32) -> Vec<Edge> {
-        // The last line crosses edges that end above it.
-        let end = last + 1;
-        let mut crossings = Vec::new();
-        let mut kept: Vec<Edge> = Vec::new();
-        for edge in edges {
-            let ([from, _], [path_from, _]) = (edge.side, edge.path);
-            if edge.meets(end) {
-                let at = edge.crossing(end);
-                crossings.push(at);
-                kept.extend(Edge::for_fronts([path_from, from], [at, end]));
-            } else if from <= end {
-                kept.push(*edge);
-            }
-        }
-        crossings.sort_unstable();
-        for pair in crossings.as_chunks::<2>().0 {
-            kept.extend(Edge::for_fronts([pair[0], end], [pair[1], end]));
-        }
-        kept.sort();
-        kept
-    }
 }
 
 /// The knots between spans of different width.
@@ -359,33 +316,41 @@ fn intervals(edges: &[Edge], side: i32, least: i32) -> Vec<[i32; 2]> {
     intervals
 }
 
-/// The first and the last line with an interval. Between two vertices an interval's length is linear, so it is greatest at one of them.
+/// The first and the last line with an interval.
 fn lines(edges: &[Edge], least: i32) -> Option<[i32; 2]> {
+    let mut sides = sides(edges);
+    let first = first_line(edges, &sides, least)?;
+    sides.reverse();
+    Some([first, first_line(edges, &sides, least)?])
+}
+
+/// The first line with an interval, in the order of these sides. Between two vertices an interval's length is linear, so it is greatest at one of them.
+fn first_line(edges: &[Edge], sides: &[i32], least: i32) -> Option<i32> {
     let holds = |side: i32| !intervals(edges, side, least).is_empty();
+    let first = sides.iter().position(|side| holds(*side))?;
+    let mut with = sides[first];
+    let mut without = match first.checked_sub(1) {
+        Some(before) => sides[before],
+        None => with,
+    };
+    while (with - without).abs() > 1 {
+        let middle = without + (with - without) / 2;
+        if holds(middle) {
+            with = middle;
+        } else {
+            without = middle;
+        }
+    }
+    Some(with)
+}
+
+/// The lines through vertices and those just before, ascending.
+fn sides(edges: &[Edge]) -> Vec<i32> {
     let mut sides: Vec<i32> = edges
         .iter()
-        .flat_map(|edge| [edge.side[0], edge.side[1] - 1])
+        .flat_map(|edge| [edge.side[0], edge.side[1] - 1, edge.side[1]])
         .collect();
-    sides.extend(edges.iter().map(|edge| edge.side[1]));
     sides.sort_unstable();
     sides.dedup();
-    let search = |mut without: i32, mut with: i32| {
-        while (with - without).abs() > 1 {
-            let middle = without + (with - without) / 2;
-            if holds(middle) {
-                with = middle;
-            } else {
-                without = middle;
-            }
-        }
-        with
-    };
-    let first = sides.iter().position(|side| holds(*side))?;
-    let last = sides.iter().rposition(|side| holds(*side))?;
-    let before = first.checked_sub(1).map(|index| sides[index]);
-    let behind = sides.get(last + 1);
-    Some([
-        before.map_or(sides[first], |before| search(before, sides[first])),
-        behind.map_or(sides[last], |behind| search(*behind, sides[last])),
-    ])
+    sides
 }

@@ -13,7 +13,8 @@
 //! first crossing and the second, the third and the fourth, ... the line is inside.
 //!
 //! For passes of constant scallop height a place on the side parameter is a share of all of it, units of 2^-[`FRONT_SIDE_BITS`], counted from the starts of its spans
-//! ([`front_side_starts`]), and edges of constant side are among the others: curves cross them. The shortest interval is a place on the path there, too.
+//! ([`front_side_starts`]), and edges of constant side are among the others: curves cross them. The shortest interval is a place on the path there, too. A cell other than
+//! the first whose last line is below its first one is machined backwards; its first line is that of the cell before it, and not passed again.
 
 mod check;
 mod scan_line;
@@ -283,11 +284,12 @@ impl CellWords<'_> {
 
     /// Whether its lines are in order and on the surface, and the shortest interval has a length.
     pub(super) fn is_sound(&self, header: &Header) -> bool {
+        let lines = [self.first(), self.last()];
+        let is_ordered = self.first() <= self.last() || (self.at > 0 && header.spacing.is_constant());
         !self.edges.is_empty()
             && self.least() > 0
-            && 0 <= self.first()
-            && self.first() <= self.last()
-            && self.last() <= side_end(header)
+            && is_ordered
+            && lines.iter().all(|line| (0..=side_end(header)).contains(line))
     }
 }
 

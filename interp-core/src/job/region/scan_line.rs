@@ -233,8 +233,8 @@ impl ScanLine {
     /// Inserts the crossing with an edge.
     fn meet(&mut self, edge: &Edge, path_end: i32) -> Result<(), BadLine> {
         let at = edge.crossing(self.side);
-        let ([from, _], [path_from, path_to]) = (edge.side, edge.path);
-        if path_from == path_to && from <= self.before {
+        let ([from, to], [path_from, path_to]) = (edge.side, edge.path);
+        if path_from == path_to && from <= self.before && self.before <= to {
             self.join([at == 0, at == path_end]);
         }
         self.insert(at)

@@ -1,4 +1,5 @@
 use super::*;
+use crate::job::Spacing;
 use std::vec;
 use std::vec::Vec;
 
@@ -254,6 +255,61 @@ fn a_region_is_checked_edge_by_edge() {
         mistakes += usize::from(check(&words).is_none());
     }
     assert_eq!(mistakes, 22);
+}
+
+/// Only cells of curved passes go backwards, and not the first, which has none before it.
+#[test]
+fn a_later_cell_of_curved_passes_may_go_backwards() {
+    let unit = 1 << FRACTION_BITS;
+    let square = vec![[0, 0], [unit, 0], [unit, unit], [0, unit]];
+    let up = words(&[square], 10);
+    let mut down = up.clone();
+    down.swap(1, 2);
+    let second = (up.len() / EDGE_WORDS) as u16;
+    let [first_down, second_down] = [[down.clone(), up.clone()].concat(), [up, down].concat()];
+    for (words, at, spacing, is_sound) in [
+        (&first_down, 0, Spacing::Exact, false),
+        (&first_down, 0, Spacing::Constant, false),
+        (&second_down, second, Spacing::Exact, false),
+        (&second_down, second, Spacing::Constant, true),
+    ] {
+        let header = Header {
+            spacing,
+            ..header(1, 1, words.len() / EDGE_WORDS)
+        };
+        let cell = RegionWords::new(words).cell(at).unwrap();
+        assert!(cell.first() > cell.last());
+        assert_eq!(cell.is_sound(&header), is_sound, "{at} {spacing:?}");
+    }
+}
+
+/// A line that is reached from above is joined to the one before where the region reaches down from there along the boundary.
+#[test]
+fn a_line_is_joined_to_the_one_above_it() {
+    let unit = 1 << FRACTION_BITS;
+    // Along path 0 the region is open from the middle on.
+    let notched = vec![
+        [0, 0],
+        [unit, 0],
+        [unit, unit],
+        [0, unit],
+        [unit / 8, unit / 2 + 1],
+        [0, unit / 2],
+    ];
+    let words = words(&[notched], 10);
+    let cell = RegionWords::new(&words).cell(0).unwrap();
+    for (before, joins) in [
+        (unit / 2, [true, true]),
+        (unit - 1, [false, true]),
+        (unit / 8, [true, true]),
+        (i32::MIN, [false, false]),
+        (i32::MAX, [false, false]),
+    ] {
+        let mut line = ScanLine::START;
+        line.begin(unit / 4, before);
+        line.finish(&cell, unit).unwrap();
+        assert_eq!(line.joins(), joins, "{before}");
+    }
 }
 
 /// A line meets at most [`CROSSINGS_MAX`] edges.

@@ -66,8 +66,17 @@ impl Direction {
     pub(crate) const fn over(first: i32, last: i32) -> Self {
         Self {
             origin: first,
-            forwards: true,
-            end: last - first,
+            forwards: first <= last,
+            end: (last - first).saturating_abs(),
+        }
+    }
+
+    /// The side parameter at a distance from the first front.
+    pub(crate) const fn side(&self, distance: i32) -> i32 {
+        if self.forwards {
+            self.origin.saturating_add(distance)
+        } else {
+            self.origin.saturating_sub(distance)
         }
     }
 

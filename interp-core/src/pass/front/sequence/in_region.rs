@@ -1,6 +1,8 @@
 //! The passes of a region: intervals of the first line of a cell, of each front, and of the last line; then the next cell.
 //!
 //! A front that holds no pass is the next one's origin like any other, in columns of its own, because the tool may still be on the one before.
+//!
+//! A cell that goes backwards begins on the first line of the one before it, which is not passed again.
 
 use super::{FrontSequence, Line, NextRoute, is_reversed};
 use crate::fault::{Fault, Result};
@@ -100,9 +102,10 @@ impl FrontSequence {
     fn set_cell(&mut self, job: &Job<'_>, lines: &RegionLines) -> Option<()> {
         let cell = lines.cell(job)?;
         self.direction = Direction::over(cell.first(), cell.last());
+        self.part = u8::from(!self.direction.forwards);
         self.region = InRegion {
             is_used: true,
-            is_flat: cell.first() >= cell.last(),
+            is_flat: cell.first() == cell.last(),
             has_next: lines.has_next_cell(job),
             ..InRegion::NONE
         };
@@ -150,7 +153,11 @@ impl FrontSequence {
 
     /// The intervals of a front are known: it holds the next pass, or the next front is made from it.
     fn take_front(&mut self, job: &Job<'_>, table: &Table<&[i32]>, lines: &mut RegionLines) {
-        lines.begin_passes(is_reversed(job.header.pattern, self.fronts.wrapping_add(1), 0));
+        lines.begin_passes(is_reversed(
+            job.header.pattern,
+            self.fronts.wrapping_add(1),
+            self.part,
+        ));
         if lines.is_any_left() {
             let last = table.stations().count().saturating_sub(1);
             self.region.before = [0, last].map(|station| table.word(Column::Front, station));
@@ -216,7 +223,13 @@ impl FrontSequence {
         if self.line == Line::Last || self.region.is_flat {
             lines.enter_next_cell(job);
             self.set_cell(job, lines);
-            self.begin_scan(lines, Line::First, 0);
+            if self.direction.forwards {
+                self.begin_scan(lines, Line::First, 0);
+            } else {
+                self.line = Line::First;
+                self.region.before = [i32::MIN; 2];
+                self.begin_cell();
+            }
             return Ok(NextRoute::NotYet);
         }
         if !self.region.is_passed {
@@ -259,7 +272,7 @@ impl FrontSequence {
         self.line = line;
         self.enter_line();
         self.region.before = [self.region.at; 2];
-        lines.begin_passes(is_reversed(job.header.pattern, self.fronts, 0));
+        lines.begin_passes(is_reversed(job.header.pattern, self.fronts, self.part));
         Ok(self
             .take_on_line(job, lines)
             .map_or(NextRoute::None, NextRoute::Pass))
@@ -274,14 +287,13 @@ impl FrontSequence {
 
     /// Seeks the intervals of a line at this distance from the cell's first one.
     fn begin_scan(&mut self, lines: &mut RegionLines, line: Line, at: i32) {
-        let Direction { origin, .. } = self.direction;
         let before = if line == Line::First {
             i32::MIN
         } else {
             let [near, far] = self.region.before;
-            origin.saturating_add(near.min(far))
+            self.direction.side(near.min(far))
         };
-        lines.begin_line(origin.saturating_add(at), before);
+        lines.begin_line(self.direction.side(at), before);
         self.region.at = at;
         self.region.scan(line);
     }
