@@ -7,7 +7,7 @@ use machine::prepare::prepare;
 use verify::swept::{ERROR_SHARE_MAX, Requirements, height_field, measure};
 
 use super::{load, random_job, seeds};
-use crate::swept::follow;
+use crate::swept::{Followed, follow};
 
 /// Every sample by the oracle, whose clipping is its own; the crests between neighbouring passes, and the height at places all over the region that are served by passes:
 /// no part of it is left out.
@@ -42,20 +42,42 @@ fn random_regions() {
         let failures = followed.findings.report.failures(&BOUNDS);
         assert!(failures.is_empty(), "{about}: {failures:?}");
         passes += followed.findings.passes;
-        let requirements = Requirements::default();
-        let swept = measure(&job, &followed.oracle, &followed.track, true, &requirements, &());
-        let is_small = |failure: &&String| !failure.contains("fewer than two whole passes");
-        let failures: Vec<_> = swept.failures.iter().filter(is_small).collect();
-        assert!(failures.is_empty(), "{about}: {failures:?}");
-        let (field, _) = height_field(&followed.oracle, &followed.track, &());
-        let most = (1.0 + ERROR_SHARE_MAX) * job.scallop_mm;
-        assert!(field.highest.height_mm <= most, "{about}: {:?}", field.highest);
+        assert_finished(&job, &followed, &about);
     }
     println!("{passes} passes, {prepared_jobs} jobs, {parted} of them in cells");
     assert!(
         count < 20 || passes > 300 && prepared_jobs > 12 && parted > 1,
         "{passes} {prepared_jobs} {parted}"
     );
+}
+
+/// The crests between neighbouring passes, and the height at all places that are served by passes.
+fn assert_finished(job: &Job, followed: &Followed, about: &str) {
+    let requirements = Requirements::default();
+    let swept = measure(job, &followed.oracle, &followed.track, true, &requirements, &());
+    let is_small = |failure: &&String| !failure.contains("fewer than two whole passes");
+    let failures: Vec<_> = swept.failures.iter().filter(is_small).collect();
+    assert!(failures.is_empty(), "{about}: {failures:?}");
+    let (field, _) = height_field(&followed.oracle, &followed.track, &());
+    let most = (1.0 + ERROR_SHARE_MAX) * job.scallop_mm;
+    assert!(field.highest.height_mm <= most, "{about}: {:?}", field.highest);
+}
+
+/// Regions in cells, two of which touched where neither had its first or its last line: 2 to 196 % above the scallop limit.
+#[test]
+fn where_cells_touch_a_pass_lies() {
+    for (seed, start) in [
+        (107, Start::Edge),
+        (58, Start::Middle),
+        (264, Start::Middle),
+        (287, Start::Middle),
+    ] {
+        let mut job = random_job(seed, true);
+        job.spacing = Spacing::Constant(start);
+        let (job, _) = machine::direction::choose(job).unwrap();
+        assert!(job.region.as_ref().is_some_and(|region| region.cells.len() > 2));
+        assert_finished(&job, &follow(&job), &format!("seed {seed}, {start:?}"));
+    }
 }
 
 /// A region that is the whole surface has the passes of the whole surface, but for the rounding of the lines.

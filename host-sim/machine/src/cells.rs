@@ -7,7 +7,8 @@
 //!
 //! A piece lies between two edges and two levels of the side parameter. Pieces that are each the other's only neighbour are an arc: a line meets it once. Two cells that
 //! touch are merged while the links over what parts them take less time than a link to the second one and its first pass, which the last one of the other has done already
-//! (boustrophedon decomposition; H. Choset, "Coverage of known spaces", 2000).
+//! (boustrophedon decomposition; H. Choset, "Coverage of known spaces", 2000). Where two cells touch, one of them has its first or its last line there: otherwise no pass
+//! would be on that line, and the passes on both sides of it could be nearly two step-overs apart.
 
 mod pieces;
 
@@ -175,6 +176,7 @@ impl Costs {
             .collect();
         // Pairs of cells that touch, with the time of the pass that both would make.
         let mut touching: BTreeMap<[usize; 2], f64> = BTreeMap::new();
+        let mut borders = Borders::new(pieces);
         for (arcs, [below, above]) in pieces.contacts() {
             let width = pieces.contact_width(below, above);
             *touching.entry(arcs).or_insert(PASS_S) += width * sizes[below].path_mm / self.feed_mm_s;
@@ -192,13 +194,14 @@ impl Costs {
             let best = gains
                 .iter()
                 .filter_map(|(pair, gain)| Some((*pair, gain.as_ref()?)))
-                .filter(|(_, (gain, _))| *gain > 0.0)
+                .filter(|(pair, (gain, _))| *gain > 0.0 && borders.keep_lines(*pair, &cells))
                 .max_by(|a, b| a.1.0.total_cmp(&b.1.0));
             let Some(([a, b], (_, both))) = best else {
                 break;
             };
             cells[a] = Some(both.clone());
             cells[b] = None;
+            borders.merge([a, b]);
             gains.retain(|pair, _| !pair.contains(&a) && !pair.contains(&b));
             let moved: Vec<([usize; 2], f64)> = touching
                 .iter()
@@ -268,6 +271,51 @@ impl Costs {
             ordered.push(cell);
         }
         ordered
+    }
+}
+
+/// Where cells touch.
+struct Borders<'a> {
+    pieces: &'a Pieces,
+    /// Pieces of different arcs, the lower first.
+    contacts: Vec<[usize; 2]>,
+    /// The cell of each arc.
+    cells: Vec<usize>,
+}
+
+impl<'a> Borders<'a> {
+    fn new(pieces: &'a Pieces) -> Self {
+        Self {
+            pieces,
+            contacts: pieces.contacts().into_iter().map(|(_, pair)| pair).collect(),
+            cells: (0..pieces.arcs().len()).collect(),
+        }
+    }
+
+    /// Two cells are the first one of them.
+    fn merge(&mut self, [a, b]: [usize; 2]) {
+        self.cells
+            .iter_mut()
+            .filter(|cell| **cell == b)
+            .for_each(|cell| *cell = a);
+    }
+
+    /// Whether, of two cells as one and each other cell that they touch, one still has its first or its last line where they do.
+    fn keep_lines(&self, [a, b]: [usize; 2], cells: &[Option<Cell>]) -> bool {
+        let slabs = |cell: usize| -> [usize; 2] {
+            let of = cells[cell].as_ref().map_or(&[][..], |cell| &cell.pieces);
+            let slab = |piece: Option<&usize>| piece.map_or(0, |piece| self.pieces.slab(*piece));
+            [slab(of.first()), slab(of.last())]
+        };
+        let ([first_a, last_a], [first_b, last_b]) = (slabs(a), slabs(b));
+        let both = [first_a.min(first_b), last_a.max(last_b)];
+        let ends = |cell: usize| if cell == a { both } else { slabs(cell) };
+        self.contacts.iter().all(|contact| {
+            let own = contact.map(|piece| self.cells[self.pieces.arc(piece)]);
+            let [lower, upper] = own.map(|cell| if cell == b { a } else { cell });
+            let [below, above] = contact.map(|piece| self.pieces.slab(piece));
+            lower == upper || (lower != a && upper != a) || ends(lower)[1] == below || ends(upper)[0] == above
+        })
     }
 }
 

@@ -137,6 +137,10 @@ impl Pieces {
         self.pieces[index].slab
     }
 
+    pub(super) fn arc(&self, index: usize) -> usize {
+        self.pieces[index].arc
+    }
+
     /// Path and side parameter of the middle.
     pub(super) fn middle(&self, index: usize) -> [f64; 2] {
         let piece = &self.pieces[index];
