@@ -297,6 +297,22 @@ fn sharp_corners_of_triangles() {
     }
 }
 
+/// Within axis limits a step before the point of a triangle: the crest between the last line and the point is too high, so a line between is made, which once was lowered from beyond the point, and then
+/// from a hair before it to behind the line it came from.
+#[test]
+fn a_line_before_the_point_of_a_triangle() {
+    for seed in [17, 234] {
+        let mut job = random_job(Shape::Pole, &mut Random(campaign_state(seed)));
+        job.spacing = Spacing::Constant(Start::Middle);
+        job.machine.limits = Some(job::AxisLimits::DEFAULT);
+        let report = follow(&job).findings.report;
+        assert!(report.complete && report.position_nm.max < 10.0, "{seed}");
+        let (excess, error) = excess(&job, &measured(&job));
+        println!("{seed}: {excess} within {error}");
+        assert!(excess <= error, "{seed}: {excess} within {error}");
+    }
+}
+
 #[test]
 #[ignore = "minutes: a campaign, see docs/figures.md"]
 fn campaign_of_triangles() {

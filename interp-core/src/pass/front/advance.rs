@@ -416,7 +416,8 @@ impl Advance {
             }
             Task::Crest if self.is_lowered && self.is_short && self.measured < MEASUREMENTS => {
                 self.measured += 1;
-                self.line = self.line.saturating_sub(self.excess);
+                // What is beyond the boundary is a pass on it.
+                self.line = self.line.min(self.direction.end).saturating_sub(self.excess);
                 (Task::Level, 0)
             }
             Task::Crest if self.is_short => (Task::Done, count),
