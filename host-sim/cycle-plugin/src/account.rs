@@ -4,8 +4,10 @@
 //! instruction without a branch to it is an exception entry; a return in a handler without an open call leaves the exception
 //! (`BX LR` or `POP {PC}` with `0xFFFFFFxx`).
 
+use core::cell::Cell;
+
 use crate::cost::{self, AddressedInstruction, Cycles, EXCEPTION, LAZY_STACKING};
-use crate::decode::{Branch, Class, decode};
+use crate::decode::{Branch, Class, Instruction, decode};
 use crate::operations::{Counter, Operations};
 use crate::plan::{Plan, STAGES, Stage};
 use crate::record::Record;
@@ -20,13 +22,25 @@ pub const RAM: u32 = 0x2000_0000;
 const VECTORS: u32 = 98;
 
 /// An instruction of the image.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 struct ImageInstruction {
     located: AddressedInstruction,
     stage: Option<Stage>,
     handler: Option<u32>,
     /// Whether a function begins here.
     starts: bool,
+    /// Its cycles after the instruction before it in memory, once known.
+    in_line: Cell<Option<Cycles>>,
+}
+
+impl ImageInstruction {
+    fn cycles_after(&self, neighbour: &Instruction) -> Cycles {
+        self.in_line.get().unwrap_or_else(|| {
+            let cycles = cost::straight(Some(neighbour), &self.located.instruction);
+            self.in_line.set(Some(cycles));
+            cycles
+        })
+    }
 }
 
 /// A thread of execution: the thread mode, or a handler.
@@ -139,6 +153,7 @@ impl Code {
             stage: self.plan.stages.get(index).copied().flatten(),
             handler,
             starts: self.plan.starts.get(index).copied().unwrap_or(false),
+            in_line: Cell::new(None),
         });
         Some(index)
     }
@@ -152,7 +167,11 @@ impl Code {
 impl Flow {
     fn execute(&mut self, code: &Code, index: usize) -> Option<Box<Record>> {
         let now = code.instruction(Some(index))?;
-        let (ended, leaves) = self.leave(code, now);
+        let (ended, leaves) = match self.before(code) {
+            // Most instructions.
+            Some(before) if before.located.end() == now.located.address => (None, false),
+            _ => self.leave(code),
+        };
         if let Some(exception) = now.handler.filter(|_| leaves || self.is_entry(code, now)) {
             self.enter(exception, now);
         }
@@ -192,15 +211,14 @@ impl Flow {
         self.contexts.push(context);
     }
 
-    /// Closes the exception if the preceding instruction returned from it. The record if it was the sample or the planning task, and
+    /// Closes the exception if the preceding instruction, which the next does not follow in memory, returned from it. The record if it was the sample or the planning task, and
     /// whether an exception was left.
-    fn leave(&mut self, code: &Code, next: &ImageInstruction) -> (Option<Box<Record>>, bool) {
+    fn leave(&mut self, code: &Code) -> (Option<Box<Record>>, bool) {
         let (Some(context), Some(before)) = (self.contexts.last(), self.before(code)) else {
             return (None, false);
         };
         let in_handler = context.exception != 0 && context.callers.is_empty();
-        let fell_through = next.located.address == before.located.end();
-        if !in_handler || !before.located.instruction.is_return() || fell_through {
+        if !in_handler || !before.located.instruction.is_return() {
             return (None, false);
         }
         let Some(mut context) = self.contexts.pop() else {
@@ -242,18 +260,23 @@ impl Flow {
         let Some(context) = self.contexts.last_mut() else {
             return;
         };
-        if let Some(before) = before {
-            follow(context, &before.located, now);
-        }
         let instruction = &now.located.instruction;
-        // A jump flushes the pipeline.
-        let neighbour = before
-            .filter(|before| before.located.end() == now.located.address)
-            .map(|before| &before.located.instruction);
+        let cycles = match before {
+            Some(before) if before.located.end() == now.located.address => {
+                now.cycles_after(&before.located.instruction)
+            }
+            // A jump flushes the pipeline.
+            jumped => {
+                if let Some(before) = jumped {
+                    follow(context, &before.located, now);
+                }
+                cost::straight(None, instruction)
+            }
+        };
         let stage = context.stage(now.stage);
         context.last = Some(index);
         context.charged = stage as usize;
-        context.charge(stage as usize, cost::straight(neighbour, instruction));
+        context.charge(stage as usize, cycles);
         let operations = context.counter.count(instruction);
         if let Some(total) = context.operations.get_mut(stage as usize) {
             *total = total.plus(operations);
@@ -276,10 +299,10 @@ impl Flow {
     }
 }
 
-/// Charges a taken branch if the instruction does not follow the preceding one in memory, and updates the open calls.
+/// Charges a taken branch to an instruction that does not follow the preceding one in memory, and updates the open calls.
 fn follow(context: &mut Context, before: &AddressedInstruction, now: &ImageInstruction) {
     let instruction = &before.instruction;
-    if now.located.address == before.end() || !instruction.may_branch() {
+    if !instruction.may_branch() {
         return;
     }
     context.charge(context.charged, cost::taken(before, &now.located));

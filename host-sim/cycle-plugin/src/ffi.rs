@@ -6,6 +6,7 @@
 #![allow(unreachable_pub, reason = "QEMU finds these items by their names")]
 #![allow(unsafe_code, reason = "a C interface; the other modules are safe code")]
 
+use std::cell::RefCell;
 use std::ffi::{CStr, c_char, c_int, c_uint, c_void};
 use std::fs::File;
 use std::io::Write;
@@ -113,17 +114,38 @@ struct Plugin {
     last: Option<Record>,
 }
 
-static PLUGIN: Mutex<Option<Plugin>> = Mutex::new(None);
+/// Handed over by the thread that loads the library. QEMU translates and executes the board's one processor in another.
+static INSTALLED: Mutex<Option<Plugin>> = Mutex::new(None);
+
+thread_local! {
+    /// The executing thread's. A lock for each instruction would take a quarter of a measurement's time.
+    static PLUGIN: RefCell<Option<Plugin>> = const { RefCell::new(None) };
+}
 
 /// The lowest address on the stack that was stored to, without the lock: most stores are above it.
 static STORED_LOWEST: AtomicU32 = AtomicU32::new(u32::MAX);
 
 fn with_plugin(f: impl FnOnce(&mut Plugin)) {
-    if let Ok(mut plugin) = PLUGIN.lock()
-        && let Some(plugin) = plugin.as_mut()
-    {
-        f(plugin);
-    }
+    // Neither fails: no function here is called within another, and the thread lives as long as QEMU executes.
+    let _ = PLUGIN.try_with(|slot| {
+        if let Ok(mut slot) = slot.try_borrow_mut()
+            && let Some(plugin) = slot.as_mut()
+        {
+            f(plugin);
+        }
+    });
+}
+
+/// Takes over what was installed.
+fn take_over() {
+    let _ = PLUGIN.try_with(|slot| {
+        if let Ok(mut slot) = slot.try_borrow_mut()
+            && let Ok(mut installed) = INSTALLED.lock()
+            && installed.is_some()
+        {
+            *slot = installed.take();
+        }
+    });
 }
 
 impl Plugin {
@@ -177,7 +199,7 @@ pub unsafe extern "C" fn qemu_plugin_install(
     match Plugin::new(&arguments) {
         Ok(plugin) => {
             let api = plugin.api;
-            if let Ok(mut slot) = PLUGIN.lock() {
+            if let Ok(mut slot) = INSTALLED.lock() {
                 *slot = Some(plugin);
             }
             (api.on_translation)(id, translated);
@@ -192,6 +214,7 @@ pub unsafe extern "C" fn qemu_plugin_install(
 
 /// Called for each translated block: registers callbacks for each of its instructions and stores.
 extern "C" fn translated(_id: u64, block: *mut c_void) {
+    take_over();
     with_plugin(|plugin| {
         let api = plugin.api;
         for number in 0..(api.instructions)(block) {
