@@ -118,7 +118,7 @@ fn runs(board: &'static Board, name: &str, changes: &[(&str, &str)], home: &str,
     );
 }
 
-/// Each board runs one of the two jobs whole, and the other in a quarter of its passes: `whole_jobs_on_both_boards` runs all of both.
+/// One board runs the shorter job whole; the others are in a quarter of their passes: `whole_jobs_on_both_boards` runs all of both.
 const COARSE: [(&str, &str); 2] = [
     ("scallop_mm = 0.005 ", "scallop_mm = 0.08 "),
     ("scallop_mm = 0.05 ", "scallop_mm = 0.8 "),
@@ -140,8 +140,8 @@ fn coarse_plate_machine_on_the_stm32f405() {
 }
 
 #[test]
-fn plate_machine_on_the_skr_pro() {
-    runs(&SKR_PRO, "plate_machine.toml", &[], "40,30,40", "4");
+fn coarse_plate_machine_on_the_skr_pro() {
+    runs(&SKR_PRO, "plate_machine.toml", &COARSE[1..], "40,30,40", "4");
 }
 
 #[test]
@@ -149,6 +149,7 @@ fn plate_machine_on_the_skr_pro() {
 fn whole_jobs_on_both_boards() {
     runs(&SKR_PRO, "torus.toml", &[], "0,0,60", "2");
     runs(&STM32F405, "plate_machine.toml", &[], "40,30,40", "3");
+    runs(&SKR_PRO, "plate_machine.toml", &[], "40,30,40", "4");
 }
 
 /// The operator's script in lockstep, with a coarser plate and a quarter of the ticks; `the_whole_script` runs it unchanged.
