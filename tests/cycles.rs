@@ -526,7 +526,7 @@ fn check_search(jobs: u32, class: JobClass) {
 
 #[test]
 fn a_short_search_finds_no_tick_over_its_budget() {
-    check_search(16, JobClass::default());
+    check_search(8, JobClass::default());
 }
 
 #[test]
@@ -546,5 +546,5 @@ fn a_short_search_of_curved_passes_finds_no_tick_over_its_budget() {
         constant: true,
         region: true,
     };
-    check_search(4, class);
+    check_search(2, class);
 }

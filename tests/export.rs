@@ -489,14 +489,21 @@ fn curved_jobs(start: Start) -> Vec<(String, Job)> {
 /// Lines and arcs of curved passes, partial ones among them, hold the same tolerances.
 #[test]
 fn curved_passes_hold_the_tolerances() {
-    for start in [Start::Edge, Start::Middle] {
-        for (name, job) in curved_jobs(start) {
-            println!("{name}");
-            let line = options(Dialect::Grbl, Kind::Linear, FeedMode::G93);
-            check(&job, &line, &of_linear(&job));
-            let arcs = options(Dialect::Linuxcnc, Kind::Curve, FeedMode::G94);
-            check(&job, &arcs, &of_curve(&job));
-        }
+    // Lines of each job from its edge, arcs from its middle, and the other way about for every second job.
+    let jobs = curved_jobs(Start::Edge)
+        .into_iter()
+        .zip(curved_jobs(Start::Middle));
+    for (index, ((name, edge), (_, middle))) in jobs.enumerate() {
+        println!("{name}");
+        let [one, other] = if index % 2 == 0 {
+            [&edge, &middle]
+        } else {
+            [&middle, &edge]
+        };
+        let line = options(Dialect::Grbl, Kind::Linear, FeedMode::G93);
+        check(one, &line, &of_linear(one));
+        let arcs = options(Dialect::Linuxcnc, Kind::Curve, FeedMode::G94);
+        check(other, &arcs, &of_curve(other));
     }
 }
 
