@@ -168,6 +168,31 @@ fn limits_hold_behind_a_short_piece() {
     hold_limits(&job_file::parse("hardly_fits", &short).unwrap());
 }
 
+/// A patch of 2 mm into which the ball hardly fits and that rolls off within its last 0.1 mm: there the centre's path turns by as much as its cells are long. With the cells of other patches 3.1,
+/// 4.8 and 798 of the jerk limit, on a face of a real part 7.5. The last one rolls off within some micrometres; its plans take so long that the tool waits for them.
+#[test]
+fn limits_hold_where_a_hollow_patch_rolls_off() {
+    for poles in [
+        [[0.0, 0.0], [1.0894, 0.0018], [1.7851, 0.5592], [1.9063, 0.6423]],
+        [[0.0, 0.0], [1.145, 0.0037], [1.847, 0.6148], [1.9063, 0.6423]],
+        [[0.0, 0.0], [1.1561, 0.0005], [1.8808, 0.6402], [1.9063, 0.6423]],
+    ] {
+        let knots = [[0.0; 4], [1.0; 4]].concat();
+        let mut job = job(&Profile {
+            knots,
+            poles: poles.to_vec(),
+        });
+        (job.feed_mm_min, job.scallop_mm) = (1200.0, 0.01);
+        let Used { shares, stand, .. } = used(&job);
+        let [velocity, acceleration, jerk] = shares;
+        assert!(
+            velocity <= 1.001 && acceleration <= 1.0 && jerk <= 1.02,
+            "{poles:?}: {shares:?}"
+        );
+        assert!(stand <= 150, "{stand} periods");
+    }
+}
+
 fn hold_limits(job: &Job) {
     let Used { shares, stand, .. } = used(job);
     let [velocity, acceleration, jerk] = shares;

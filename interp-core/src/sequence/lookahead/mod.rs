@@ -99,7 +99,7 @@ pub(crate) struct Lookahead {
     has_derivatives: bool,
     /// The surface is smooth where the stretch begins.
     may_join: bool,
-    /// Stations before the stretch; halvings of its cells, because the path bends; the path turns too far within a cell.
+    /// Stations before the stretch, or the patch; halvings of its cells, because the path bends; the path turns too far within a cell.
     begun: u16,
     halvings: u8,
     is_coarse: bool,
@@ -118,9 +118,10 @@ pub(crate) struct Lookahead {
     /// Mean length of a patch of the last pass, mm, or the greatest by the way of the centre around an edge; the greatest of those so far.
     patch_mm: f32,
     centre_mm: f32,
-    /// Whether the centre's path bent much more than the contact's on the last pass, and so far.
+    /// Whether the centre's path bent much more than the contact's on the last pass, and so far; the ball hardly fits into a half of this patch.
     has_bend: bool,
     bends: bool,
+    hardly_fits: bool,
     /// Whether the curvature jumped at a patch boundary of the last pass, and so far.
     has_jump: bool,
     jumps: bool,
@@ -181,6 +182,7 @@ impl Lookahead {
         centre_mm: 0.0,
         has_bend: false,
         bends: false,
+        hardly_fits: false,
         has_jump: false,
         jumps: false,
         bend: [0.0; 3],
@@ -291,7 +293,9 @@ impl Lookahead {
         lines: &mut RegionLines,
         out: &mut PassPlan,
     ) -> Result<()> {
-        let mut estimator = estimator.filter(|_| self.whole.is_none());
+        // The second look at a patch is for the derivatives alone.
+        let is_first_look = self.halvings == 0 || self.is_on_front();
+        let mut estimator = estimator.filter(|_| self.whole.is_none() && is_first_look);
         self.task = match self.task {
             Task::Patch => {
                 let first = self.patches == 0;
@@ -315,8 +319,6 @@ impl Lookahead {
                     estimator.begin_patch();
                 }
                 self.choose_cells(job, out);
-                self.window = Window::EMPTY;
-                self.arc_mm = 0.0;
                 Task::Station
             }
             Task::Extend => self.extend_stretch(job, out),
@@ -444,8 +446,8 @@ impl Lookahead {
             self.station += 1;
             return Task::Station;
         }
-        if self.looks_finer(out) {
-            return Task::Patch;
+        if let Some(again) = self.looks_finer(out) {
+            return again;
         }
         self.start_q10 += to_q10(self.arc_mm);
         let next = if self.is_on_front() {

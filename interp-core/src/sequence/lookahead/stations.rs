@@ -2,7 +2,7 @@
 
 use super::{CELL_KEPT_MM, Lookahead, PATCHES, PassPlan, Task, check_crease, check_travel, stations_of};
 use crate::fault::{Fault, FaultKind, Result};
-use crate::feed::stations::{CELLS_MANY, Derivatives, Station, WINDOW, parts_of_cell};
+use crate::feed::stations::{CELLS_MANY, Derivatives, Station, WINDOW, Window, parts_of_cell};
 use crate::job::program::Job;
 use crate::job::{AxisLimits, Spacing, SurfaceKind};
 use crate::math::arith::{fraction_to_f32, sqrt, truncated};
@@ -33,16 +33,20 @@ impl Lookahead {
     pub(super) fn choose_cells(&mut self, job: &Job<'_>, out: &mut PassPlan) {
         let spans = job.header.path_spans.max(1);
         let whole = |value: f32| u16::try_from(truncated(value)).unwrap_or(u16::MAX);
-        let whole_part = self.piece.end().saturating_sub(self.piece.start());
-        let part = |cells: u16| whole_part.checked_div(u64::from(cells)).unwrap_or(u64::MAX);
-        let [length, centre] = self.patch_lengths();
+        let halves = self.patch_lengths();
+        let [[first, first_centre], [second, second_centre]] = halves;
+        let (length, centre) = (first + second, first_centre + second_centre);
         // Where the ball goes around an edge, its centre moves much farther than the contact, and the path bends by that.
         let by_centre = CENTRE_SHARE * centre;
         if by_centre > length {
             self.centre_mm = self.centre_mm.at_least(by_centre);
         }
         // Where it hardly fits, the centre's path bends as much.
-        self.bends |= by_centre > length || centre < HARDLY_FITS * length;
+        let hardly_fits = |length: f32, centre: f32| centre < HARDLY_FITS * length;
+        self.bends |= by_centre > length || hardly_fits(length, centre);
+        self.hardly_fits = halves
+            .iter()
+            .any(|[length, centre]| hardly_fits(*length, *centre));
         let length = length.at_least(by_centre);
         if out.cells == 0 {
             let [start, end] = out.route.ends;
@@ -87,12 +91,22 @@ impl Lookahead {
         }
         self.looks = parts_of_cell(length, out.cells);
         out.plan.stations.note_cells(out.cells, out.group);
-        self.cells = out.cells * self.looks;
-        self.cell_fraction = part(self.cells);
+        self.begun = out.plan.stations.count();
+        self.divide_patch(out);
     }
 
-    /// Lengths of the contact's and of the centre's way over the patch, roughly, mm; 0 where its surface is not evaluated.
-    fn patch_lengths(&self) -> [f32; 2] {
+    /// Begins the stations of a patch, with the cells that are looked at for each of those between kept ones.
+    pub(super) fn divide_patch(&mut self, out: &PassPlan) {
+        self.cells = out.cells * self.looks;
+        let whole = self.piece.end().saturating_sub(self.piece.start());
+        self.cell_fraction = whole.checked_div(u64::from(self.cells)).unwrap_or(u64::MAX);
+        self.window = Window::EMPTY;
+        self.arc_mm = 0.0;
+        self.station = 0;
+    }
+
+    /// Lengths of the contact's and of the centre's way over each half of the patch, roughly, mm; 0 where its surface is not evaluated.
+    fn patch_lengths(&self) -> [[f32; 2]; 2] {
         let at = |fraction| {
             let located = self.patch.evaluate_on_line(fraction);
             located.map(|(_, located)| [located.cc_nm, located.cl_nm])
@@ -100,7 +114,7 @@ impl Lookahead {
         let [start, end] = self.piece.range;
         let middle = start + end.saturating_sub(start).div_ceil(2);
         let (Ok(start), Ok(middle), Ok(end)) = (at(start), at(middle), at(end)) else {
-            return [0.0; 2];
+            return [[0.0; 2]; 2];
         };
         let apart = |from: &[i32; 3], to: &[i32; 3]| {
             let mut sum = 0.0;
@@ -110,13 +124,8 @@ impl Lookahead {
             }
             sqrt(sum)
         };
-        let [mut contact, mut centre] = [0.0; 2];
-        for [from, to] in [[&start, &middle], [&middle, &end]] {
-            let ([from_cc, from_cl], [to_cc, to_cl]) = (from, to);
-            contact += apart(from_cc, to_cc);
-            centre += apart(from_cl, to_cl);
-        }
-        [contact, centre]
+        [[&start, &middle], [&middle, &end]]
+            .map(|[[from_cc, from_cl], [to_cc, to_cl]]| [apart(from_cc, to_cc), apart(from_cl, to_cl)])
     }
 
     /// The derivatives that can be taken after a station.
@@ -168,6 +177,9 @@ impl Lookahead {
             self.keep_derivatives(station, usize::from(at), out);
         } else if rest == 0 {
             let q = self.window.derivatives(usize::from(at));
+            if self.hardly_fits {
+                self.note_turn(&q);
+            }
             let back = self.station / looks - kept + 1;
             if station == 0 {
                 self.store_start(back, q, out);
@@ -268,7 +280,7 @@ impl Lookahead {
             0.0
         };
         let bend = [contact.along, twist, across];
-        if self.station == 0 {
+        if self.station == 0 && (is_first_look || self.is_on_front()) {
             let apart = |(from, to): (&f32, &f32)| (to - from).abs() > NO_JUMP;
             self.is_smooth = self.patches > 0 && (self.may_join || !self.bend.iter().zip(&bend).any(apart));
             self.jumps |= self.patches > 0 && !self.is_smooth;

@@ -28,6 +28,10 @@ const THIRD_NOISE: f32 = 60e-6;
 const TURN_OF_CELL: f32 = 0.12;
 const CHANGE_OF_CELL: f32 = 0.008;
 const HALVINGS_MAX: u8 = 2;
+/// The same on a patch of a straight pass into which the ball hardly fits: all of it is looked at again; shorter cells are not halved, mm.
+const CHANGE_STRAIGHT: f32 = 0.04;
+const HALVINGS_STRAIGHT: u8 = 4;
+const HALVED_MIN_MM: f32 = 0.03;
 /// Share of the jerk limit that the error of a third derivative takes at the feed up to which a cell is not longer, and steps to longer ones.
 const NOISE_SHARE: f32 = 0.05;
 const CELL_STEP: f32 = 1.2;
@@ -180,29 +184,53 @@ impl Lookahead {
             && self.part_mm(span_end.saturating_sub(end)) >= STRETCH_KNOT_MM
     }
 
-    /// Begins the stretch again with cells half as long where the path turns too far within one. Returns whether it does.
-    pub(super) fn looks_finer(&mut self, out: &mut PassPlan) -> bool {
+    /// Begins the stretch, or the patch of a straight pass, again with cells half as long where the path turns too far within one. Returns the task by which it does.
+    pub(super) fn looks_finer(&mut self, out: &mut PassPlan) -> Option<Task> {
         let is_coarse = core::mem::take(&mut self.is_coarse);
-        if !is_coarse || self.halvings >= HALVINGS_MAX {
+        let (most, is_fine) = if self.is_on_front() {
+            (HALVINGS_MAX, false)
+        } else {
+            let cell = self.arc_mm / f32::from(self.cells);
+            (HALVINGS_STRAIGHT, cell < HALVED_MIN_MM)
+        };
+        if !is_coarse || is_fine || self.halvings >= most {
             self.halvings = 0;
-            return false;
+            return None;
         }
         self.halvings += 1;
         out.plan.stations.truncate(self.begun);
+        if !self.is_on_front() {
+            self.looks = (2 * self.looks).min(PARTS_MAX);
+            self.divide_patch(out);
+            return Some(Task::Station);
+        }
         let [first, _] = self.stretch;
         self.piece = first;
-        true
+        Some(Task::Patch)
+    }
+
+    /// Notes whether the path turns too far within a cell that these derivatives were taken over.
+    pub(super) fn note_turn(&mut self, q: &Derivatives) {
+        let cell = self.window.spacing_mm();
+        let (mut way, mut change) = (cell, CHANGE_OF_CELL);
+        if !self.is_on_front() {
+            change = CHANGE_STRAIGHT;
+            // Where such a patch rolls off, the centre moves much farther than the contact.
+            for [first, ..] in q {
+                way = way.at_least(first.abs() * cell);
+            }
+        }
+        for [_, second, third] in q {
+            self.is_coarse |= second.abs() * cell * cell > TURN_OF_CELL * way
+                || third.abs() * cell * cell * cell > change * way;
+        }
     }
 
     /// Stores the derivatives at a place of the window in the station at the stretch's start, or appends a station: at its end, and wherever the derivatives have changed
     /// notably since the last one. Between stations they are taken for linear.
     pub(super) fn keep_derivatives(&mut self, station: u16, at: usize, out: &mut PassPlan) {
         let q = self.window.derivatives(at);
-        let cell = self.window.spacing_mm();
-        for [_, second, third] in &q {
-            self.is_coarse |=
-                second.abs() * cell > TURN_OF_CELL || third.abs() * cell * cell > CHANGE_OF_CELL;
-        }
+        self.note_turn(&q);
         let here = Station {
             arc_nm: self.arc_nm(self.window.arc_mm(at)),
             q,
