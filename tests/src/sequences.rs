@@ -15,6 +15,8 @@ pub type Core = Interpolator<Vec<i32>>;
 /// Periods between the places of a run from which sequences start, and those of a long job that they start from, before its end.
 const EVERY: usize = 23;
 const LAST: usize = 3000;
+/// Of these places, how many lie just before the first pass.
+const APPROACHES: usize = 4;
 /// Periods after the last command within which a run has ended, and equal samples in contact that are none of a stand.
 const ENDS: usize = 60_000;
 const STANDS: u32 = 4;
@@ -452,6 +454,30 @@ impl Course {
             run.outcome.stands = 1;
         }
         Ok(run.outcome)
+    }
+
+    /// What comes of a stop at an override of 0 in the approach to the first pass, which ends there where the way is too short to stop on, of an abort in the retract
+    /// from there, and of a new start.
+    ///
+    /// # Errors
+    /// What the first that breaks something breaks.
+    pub fn start_again_from_the_first_pass(&self) -> Result<Outcome, String> {
+        let mut all = Outcome::default();
+        let places = self.starts.iter();
+        let approach: Vec<_> = places
+            .take_while(|start| start.sample.state == State::Linking)
+            .collect();
+        for start in approach.iter().rev().take(APPROACHES) {
+            for wait in 0..EVERY {
+                let steps = [
+                    (wait, Some(Command::Stop), 0),
+                    (200, Some(Command::Abort), 100),
+                    (2, Some(Command::Start), 100),
+                ];
+                all.add(&self.run(start, &steps)?);
+            }
+        }
+        Ok(all)
     }
 
     /// What comes of an override of 0 for 100 periods at each of the places.

@@ -278,6 +278,13 @@ impl Curve {
         self.pieces.get(usize::from(index)).unwrap_or(&NONE)
     }
 
+    /// Becomes a curve without length: its start is its end.
+    pub(crate) const fn clear(&mut self) {
+        let [first, ..] = &mut self.pieces;
+        *first = Piece::NONE;
+        self.last = 0;
+    }
+
     /// The cursor at the start.
     pub(crate) fn start(&self) -> CurveCursor {
         CurveCursor {

@@ -77,6 +77,14 @@ impl Progress {
         self.pace = Pace::REST;
     }
 
+    /// Becomes one without length, which is over.
+    fn end(&mut self) {
+        self.curve.clear();
+        self.cursor = self.curve.start();
+        self.length_q10 = 0;
+        self.pace = Pace::REST;
+    }
+
     /// The motion along the link.
     pub(crate) const fn curve(&self) -> &Curve {
         &self.curve

@@ -24,8 +24,8 @@ impl StraightMove {
         to: [0; 3],
     };
 
-    /// Becomes a move from point to point whose last `slow_mm` does not exceed `feed_mm_s`; returns whether its length is more than negligible. In
-    /// place, because a copy costs more than the rest.
+    /// Becomes a move from point to point whose last `slow_mm` does not exceed `feed_mm_s`; returns whether its length is more than negligible: if not, it is
+    /// over. In place, because a copy costs more than the rest.
     pub(crate) fn lead(
         &mut self,
         from: [i32; 3],
@@ -38,7 +38,9 @@ impl StraightMove {
         for ((apart, from), to) in apart.iter_mut().zip(&from).zip(&to) {
             *apart = i64::from(*to) - i64::from(*from);
         }
+        (self.from, self.to) = (from, to);
         if apart.iter().all(|apart| apart.abs() <= NOTHING_NM) {
+            self.progress.end();
             return false;
         }
         let mm = apart.map(to_mm);
@@ -63,7 +65,6 @@ impl StraightMove {
         }
         self.progress
             .lead(length, Curve::new(length, &limits, slow_mm, feed_mm_s));
-        (self.from, self.to) = (from, to);
         true
     }
 
