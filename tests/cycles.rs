@@ -510,7 +510,11 @@ fn the_worst_ticks_have_not_grown() {
 fn check_search(jobs: u32, class: JobClass) {
     let mut session = MeasurementSession::new(images::setup()).unwrap();
     let result = search(&mut session, jobs, 3, class, || {}).unwrap();
-    assert!(result.executed >= jobs / 3, "{} jobs ran", result.executed);
+    assert!(
+        result.executed >= (jobs / 3).max(1),
+        "{} jobs ran",
+        result.executed
+    );
     let found = &result.elite[0];
     let cycles = figures::tick_cycles(&found.worst.record, figures::Model::Pessimistic);
     assert!(cycles < PERIOD_CYCLES / 10, "{cycles} cycles: {found:?}");

@@ -39,9 +39,7 @@ fn the_first_passes_of_a_hundred_rows() {
     make_ready(&mut session, &Setup::simulated(Configuration::DEFAULT)).unwrap();
     let cut = "scallop_mm = 0.04\npattern = \"zigzag\"";
     for (machine, passes) in [("", 18), (LIMITS, 12)] {
-        let mut job = bumpy([100, 100], [0.5, 0.8], cut, machine);
-        job.feed_mm_min = 6000.0;
-        let job = prepare(&job).unwrap();
+        let job = prepare(&bumpy([100, 100], [0.5, 0.8], cut, machine)).unwrap();
         assert_eq!((job.patches(), job.header.window), (10_000, 3));
         let (wanted, ticks) = first_passes(&job, passes);
         drive::upload(&mut session, &job, |_| {}).unwrap();

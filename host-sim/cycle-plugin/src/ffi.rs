@@ -125,12 +125,14 @@ thread_local! {
 /// The lowest address on the stack that was stored to, without the lock: most stores are above it.
 static STORED_LOWEST: AtomicU32 = AtomicU32::new(u32::MAX);
 
-fn with_plugin(f: impl FnOnce(&mut Plugin)) {
+fn with_slot(f: impl FnOnce(&mut Option<Plugin>)) {
     // Neither fails: no function here is called within another, and the thread lives as long as QEMU executes.
-    let _ = PLUGIN.try_with(|slot| {
-        if let Ok(mut slot) = slot.try_borrow_mut()
-            && let Some(plugin) = slot.as_mut()
-        {
+    let _ = PLUGIN.try_with(|slot| slot.try_borrow_mut().map(|mut slot| f(&mut slot)));
+}
+
+fn with_plugin(f: impl FnOnce(&mut Plugin)) {
+    with_slot(|slot| {
+        if let Some(plugin) = slot {
             f(plugin);
         }
     });
@@ -138,10 +140,9 @@ fn with_plugin(f: impl FnOnce(&mut Plugin)) {
 
 /// Takes over what was installed.
 fn take_over() {
-    let _ = PLUGIN.try_with(|slot| {
-        if let Ok(mut slot) = slot.try_borrow_mut()
+    with_slot(|slot| {
+        if slot.is_none()
             && let Ok(mut installed) = INSTALLED.lock()
-            && installed.is_some()
         {
             *slot = installed.take();
         }
