@@ -2,6 +2,7 @@
 //! own, `cargo run --release -p integration-tests --bin sequences -- 0 1000000`.
 
 use integration_tests::sequences::{Course, run_all};
+use interp_core::Command;
 
 #[test]
 fn no_sequence_of_commands_breaks_a_limit() {
@@ -24,4 +25,44 @@ fn a_slower_pace_from_the_feed() {
     let course = Course::of_region(1, "[[0.1, 0.1], [0.9, 0.11], [0.9, 0.8], [0.1, 0.8]]");
     let outcome = course.pause_at_each_place().unwrap();
     assert!(outcome.count > 100, "{}", outcome.count);
+}
+
+/// Longest stand in contact that no command has asked for, periods.
+const STAND_MAX: u32 = 4;
+
+/// The pass was planned for 200 %, so it lasted as long as the planning of the next one. The search for 100 % took the planning's time, and at the end of the pass the planner went on with
+/// steps for which it took the time of a whole pass as left: 181 ms.
+#[test]
+fn a_lower_override_does_not_make_the_next_plan_late() {
+    let steps = [
+        (0, None, 200),
+        (301, Some(Command::Resume), 200),
+        (641, None, 100),
+    ];
+    let course = &Course::all()[1];
+    for wait in [560, 600, 620, 641, 660] {
+        let mut steps = steps;
+        steps[2].0 = wait;
+        let outcome = course.run_from(3313, &steps).unwrap();
+        assert!(
+            outcome.stand.0 <= STAND_MAX,
+            "{wait}: {} periods",
+            outcome.stand.0
+        );
+    }
+}
+
+/// A hold near the end of a pass, resumed in any period around that end: the hop began at rest, and its pace was sought for 99 ms, though it can begin at any.
+#[test]
+fn a_resume_at_the_end_of_a_pass_is_followed_at_once() {
+    let course = &Course::all()[0];
+    for wait in 30..45 {
+        let steps = [(55, Some(Command::Hold), 100), (wait, Some(Command::Resume), 95)];
+        let outcome = course.run_from(7959, &steps).unwrap();
+        assert!(
+            outcome.stand.0 <= STAND_MAX,
+            "{wait}: {} periods",
+            outcome.stand.0
+        );
+    }
 }

@@ -249,7 +249,7 @@ impl Course {
 }
 
 /// Commands of a sequence: a wait in periods, a command, and the override from that period on, %.
-type Step = (usize, Option<Command>, u8);
+pub type Step = (usize, Option<Command>, u8);
 
 /// The steps of a sequence.
 fn steps(random: &mut Random, may_start: bool) -> Vec<Step> {
@@ -290,8 +290,8 @@ pub struct Outcome {
     pub hold: (usize, u64),
     /// Longest stand in contact while a feed was commanded, periods, and the seed of the sequence.
     pub stand: (u32, u64),
-    /// Sequences with such a stand.
-    pub stands: usize,
+    /// Sequences with a stand that is too long: the seed, and its periods.
+    pub stands: Vec<(u64, u32)>,
 }
 
 impl Outcome {
@@ -304,7 +304,7 @@ impl Outcome {
         }
         self.hold = self.hold.max(other.hold);
         self.stand = self.stand.max(other.stand);
-        self.stands += other.stands;
+        self.stands.extend_from_slice(&other.stands);
     }
 }
 
@@ -407,7 +407,9 @@ impl Run<'_> {
     /// A stand at an end of a pass while a feed is commanded, that no hold has begun.
     fn count_stand(&mut self, before: &Sample, sample: &Sample) {
         self.held |= self.percent < SLOW || matches!(sample.state, State::Holding | State::Held);
+        // In the first and the last periods of a slow motion the place is the same to the nanometre.
         let stands = sample.cl_nm == before.cl_nm
+            && sample.feed_mm_s <= 0.0
             && matches!(sample.state, State::Running | State::Linking)
             && !self.held
             && self.course.ends.contains(&sample.cl_nm);
@@ -450,10 +452,16 @@ impl Course {
         if !run.uses.are_permitted() {
             return Err(told(format!("{:?} of the limits", run.uses.worst)));
         }
-        if run.outcome.stand.0 > STANDS {
-            run.outcome.stands = 1;
-        }
         Ok(run.outcome)
+    }
+
+    /// What comes of some steps from the place of the undisturbed run at this tick.
+    ///
+    /// # Errors
+    /// What they break, or that there is no such place.
+    pub fn run_from(&self, tick: u32, steps: &[Step]) -> Result<Outcome, String> {
+        let start = self.starts.iter().find(|start| start.sample.tick == tick);
+        self.run(start.ok_or("no such place")?, steps)
     }
 
     /// What comes of a stop at an override of 0 in the approach to the first pass, which ends there where the way is too short to stop on, of an abort in the retract
@@ -506,6 +514,9 @@ pub fn run(courses: &[Course], seed: u64) -> Result<Outcome, String> {
         .run(start, &steps)
         .map_err(|what| format!("seed {seed}: {what}"))?;
     (outcome.stand.1, outcome.hold.1) = (seed, seed);
+    if outcome.stand.0 > STANDS {
+        outcome.stands.push((seed, outcome.stand.0));
+    }
     Ok(outcome)
 }
 

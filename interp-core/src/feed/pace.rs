@@ -98,6 +98,8 @@ pub(crate) struct Pace<C> {
     goal: f32,
     wanted: f32,
     is_fault: bool,
+    /// Whether the motion has not moved yet.
+    is_at_start: bool,
     /// Whether a long stop is followed that a search may find a shorter one for.
     is_long_stop: bool,
     /// The pace above 1 that is wanted, or 1; the one that there is time for; the periods for which none is sought; the greatest of the change that is followed.
@@ -123,6 +125,7 @@ impl<C: Copy> Pace<C> {
         goal: 0.0,
         wanted: 0.0,
         is_fault: false,
+        is_at_start: false,
         is_long_stop: false,
         above: 1.0,
         most: 1.0,
@@ -146,6 +149,7 @@ impl<C: Copy> Pace<C> {
         self.is_long_stop = false;
         (self.failures, self.timeouts) = (0, 0);
         (self.goal, self.wanted, self.period) = (pace, pace, period);
+        self.is_at_start = true;
     }
 
     /// Sets the pace that is wanted, above 1 where the axes leave it; a controlled stop after a fault may use more than the limits.
@@ -159,6 +163,9 @@ impl<C: Copy> Pace<C> {
             self.search = None;
             self.wait = 0;
             (self.failures, self.timeouts) = (0, 0);
+            if self.is_at_start {
+                self.goal = wanted;
+            }
         }
     }
 
@@ -271,6 +278,7 @@ impl<C: Copy> Pace<C> {
     /// One period: the pace in its middle.
     pub(crate) fn tick(&mut self, profiles: &mut Profiles) -> f32 {
         self.wait = self.wait.saturating_sub(1);
+        self.is_at_start &= self.goal == 0.0;
         if let Some(search) = &mut self.search {
             if search.left > 0 {
                 search.left -= 1;

@@ -26,10 +26,6 @@ const AFTER_CUT: f32 = 1.5;
 /// The greatest weight in the last steps, and how many those are.
 const BARRIER_AT_END: f32 = 7e-4;
 const STEPS_AT_END: u16 = 2;
-/// Share of the motion by which a whole step at the last weight still shortens it where it is not the last one; and share of what the motion takes more than the
-/// walk by which a step shortens it, whatever the one before it did.
-const UNSOLVED: f32 = 0.05;
-const SHORTENS: f32 = 0.125;
 /// The last weight with an end at speed: what the plan leaves of the limits is what the last stop before the end begins with.
 const BARRIER_LAST_AT_SPEED: f32 = 1e-3;
 /// Most steps from rest to rest; with an end at speed, and the fewest.
@@ -211,6 +207,18 @@ impl Planner {
         };
         let check = PERIODS_A_PLACE * (self.lasts - to_f32(checked)).at_least(0.0) + PERIODS_LEFT;
         f32::from(steps) * self.periods_of_step(plan) + check
+    }
+
+    /// Periods that are left of the step that is being made, where it is none of those that [`Self::least_left`] counts.
+    pub(crate) fn step_left(&self, plan: &Plan, spent: u32) -> f32 {
+        let is_in_step = !matches!(
+            self.stage,
+            Stage::Check | Stage::Finish | Stage::Gate | Stage::Done
+        );
+        if !is_in_step || self.step < STEPS_FIRST {
+            return 0.0;
+        }
+        (self.periods_of_step(plan) - to_f32(spent.saturating_sub(self.taken))).at_least(0.0)
     }
 
     /// Cycles of the next piece of work.
@@ -429,22 +437,19 @@ impl Planner {
         u16::try_from(truncated(steps)).unwrap_or(u16::MAX)
     }
 
-    /// Whether another step is to be taken, for which there is time, or which pays; chooses its barrier. `shorter`: periods by which the last one shortened the motion.
-    fn goes_on(&mut self, plan: &Plan, deadlines: Deadlines, shorter: f32) -> bool {
+    /// Whether another step is to be taken, for which there is time, or which pays; chooses its barrier.
+    fn goes_on(&mut self, plan: &Plan, deadlines: Deadlines, pays: bool) -> bool {
         if self.step < STEPS_FIRST {
             return true;
         }
         let lasts = self.lasts;
         let went = self.reach.step();
-        // A step that shortens the check by more than it takes itself costs nothing.
-        let walk = plan.step_s / (self.weight * plan.limits.period);
-        let pays = PERIODS_A_PLACE * shorter.at_least(SHORTENS * (lasts - walk)) > self.periods_of_step(plan);
         let last = if plan.pinned() == [0; 2] {
             BARRIER_LAST
         } else {
             BARRIER_LAST_AT_SPEED
         };
-        let is_solved = self.barrier <= last && went >= 1.0 && shorter < UNSOLVED * lasts;
+        let is_solved = self.barrier <= last && went >= 1.0;
         let may_go_on = self.steps_left(plan, lasts, deadlines) > 0 || (pays && self.step < STEPS_MAX);
         if is_solved || !may_go_on {
             return false;
@@ -472,13 +477,13 @@ impl Planner {
         true
     }
 
-    /// Periods that the motion takes at the pace as it is: by its values at the nodes. A coefficient may be much less than these.
+    /// Periods that the motion takes at the pace as it is.
     fn lasts(&self, plan: &Plan) -> f32 {
-        let nodes = usize::from(plan.intervals) + 1;
-        let pace = draft(&self.lists);
-        let sum: f32 = (pace.iter().zip(pace.iter().skip(1)))
-            .take(nodes)
-            .map(|(here, next)| inverse_sqrt((0.5 * (here + next)).at_least(1e-9)))
+        let count = usize::from(plan.intervals) + 2;
+        let sum: f32 = draft(&self.lists)
+            .iter()
+            .take(count)
+            .map(|pace| inverse_sqrt(pace.at_least(1e-9)))
             .sum();
         sum * plan.step_s / plan.limits.period
     }
@@ -512,7 +517,9 @@ impl Planner {
         self.taken = deadlines.spent;
         let before = self.lasts;
         self.lasts = self.lasts(plan);
-        if self.goes_on(plan, deadlines, before - self.lasts) {
+        // A step that shortens the check by more than it takes itself costs nothing.
+        let pays = PERIODS_A_PLACE * (before - self.lasts) > self.periods_of_step(plan);
+        if self.goes_on(plan, deadlines, pays) {
             return self.begin_step(plan);
         }
         self.begin_check(plan);

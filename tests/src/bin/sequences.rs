@@ -25,9 +25,12 @@ fn main() -> ExitCode {
             outcome.periods,
             outcome.worst,
             outcome.hold,
-            outcome.stands,
+            outcome.stands.len(),
             outcome.stand
         );
+        for (seed, periods) in outcome.stands {
+            println!("seed {seed} stands for {periods} periods");
+        }
         for error in errors {
             failed = true;
             println!("{error}");

@@ -139,6 +139,8 @@ pub(crate) struct Sequencer {
     passed: f32,
     /// Greatest pace until the next pass is planned, where the planning would last longer than the present one.
     wait_pace: f32,
+    /// Whether the next plan comes before a search for a pace in this period.
+    plan_comes_first: bool,
     /// Feed factor of the last period.
     feed_factor: f32,
     /// The tool may have to wait on the surface at the end of the pass that is planned.
@@ -199,6 +201,7 @@ impl Sequencer {
         front_last: 0,
         passed: 0.0,
         wait_pace: f32::MAX,
+        plan_comes_first: false,
         feed_factor: 1.0,
         ends_on_surface: false,
         at: None,

@@ -53,6 +53,8 @@ const WAIT_PACE_MIN: f32 = 0.02;
 /// Periods that the search for that change takes: with fewer left it would only delay the plan; and those by which that may be late without it.
 const PERIODS_A_SEARCH: f32 = 30.0;
 const PERIODS_LATE: f32 = 8.0;
+/// Periods by which a plan is to be complete before it is needed, where a search for a pace would delay it.
+const PERIODS_URGENT: f32 = 12.0;
 
 /// Feed above that of a plan for which it is planned anew, as a ratio.
 const REPLANNED: f32 = 1.001;
@@ -101,7 +103,7 @@ impl Sequencer {
     /// Whether a change of the pace is sought before anything else is planned.
     #[inline(always)]
     fn seeks_pace(&self) -> bool {
-        self.pace.has_work() && !self.waits_for_plan()
+        self.pace.has_work() && !self.plan_comes_first && !self.waits_for_plan()
     }
 
     /// Whether the tool stands until the next pass is planned.
@@ -151,6 +153,12 @@ impl Sequencer {
                 .map_or(1.0, |job| self.pace_in_time(&job, axes, run));
             self.pace.allow_above(most);
         }
+        self.plan_comes_first = matches!(self.phase, Phase::Pass)
+            && self.planning == Planning::Feed
+            && self.pace.has_work()
+            && program
+                .job(store)
+                .is_ok_and(|job| self.is_plan_urgent(&job, axes));
         match self.planning {
             Planning::Requested(..) | Planning::Stations | Planning::Feed => {
                 // Periods in which a change of the pace is sought are none of the planning's.
@@ -213,6 +221,39 @@ impl Sequencer {
             && !self.pace.has_work()
             && self.periods_left(feed, job.header.period_s)
                 > 1.5 * f32::from(next.plan.intervals) * PERIODS_A_NODE + PERIODS_A_PASS
+    }
+
+    /// Periods until the next plan is needed at the present plan's own pace: to the end of the pass, where the tool would wait for it on the surface.
+    #[inline(always)]
+    fn periods_to_link(&self, job: &Job<'_>, axes: &AxisLimits) -> Option<f32> {
+        let (now, next) = self.plans_ref();
+        let is_joined = now.steps_over && !job.header.spacing.is_constant();
+        let is_low = || job.header.links > 0 && job.link_to(next.pass, axes).is_low();
+        let is_reached_on_surface = next.pass > self.first.pass && (is_joined || is_low());
+        is_reached_on_surface.then(|| match self.phase {
+            Phase::Pass => count_to_f32(now.plan.periods) - self.passed,
+            Phase::Await => 0.0,
+            _ => count_to_f32(now.plan.periods),
+        })
+    }
+
+    /// Whether the next plan comes before a search for a pace: the tool would stand at the end of the pass otherwise. A stop comes before that, and so does a slower pace
+    /// with which the plan is in time again.
+    #[inline(never)]
+    fn is_plan_urgent(&self, job: &Job<'_>, axes: &AxisLimits) -> bool {
+        let Some(left) = self.periods_to_link(job, axes).filter(|_| self.pending.is_none()) else {
+            return false;
+        };
+        let (_, next) = self.plans_ref();
+        if self.planner.is_walking() || self.pace.wanted() == 0.0 {
+            return false;
+        }
+        let fastest = self.pace.now().at_least(self.pace.goal());
+        let left = left / fastest.at_least(WAIT_PACE_MIN);
+        let needed = self.planner.least_left(&next.plan) + self.planner.step_left(&next.plan, self.spent);
+        let is_late = self.wait_pace < f32::MAX;
+        let gains = is_late && self.pace.wanted() < self.pace.now() && left > PERIODS_A_SEARCH;
+        needed + PERIODS_URGENT > left && !gains
     }
 
     /// Periods to the end of the pass at this feed, mm/s: at least.
@@ -450,6 +491,9 @@ impl Sequencer {
                 }
             }
             Planning::Feed => {
+                let left = self.periods_to_link(job, axes);
+                let left = left.map(|left| (left - count_to_f32(SPARE_PERIODS)).at_least(0.0));
+                let (_, next) = both(&mut self.plans, self.second);
                 // The pass after it takes as long to plan; off the surface it can be waited for.
                 let is_last = next.is_last && !self.planner.is_walking();
                 let least = if !is_last && self.ends_on_surface {
@@ -470,17 +514,6 @@ impl Sequencer {
                 } else {
                     0
                 };
-                let is_joined = now.steps_over && !job.header.spacing.is_constant();
-                let is_low = || job.header.links > 0 && job.link_to(next.pass, axes).is_low();
-                let is_reached_on_surface = next.pass > self.first.pass && (is_joined || is_low());
-                let left = is_reached_on_surface.then(|| {
-                    let passed = if self.phase == Phase::Pass {
-                        self.passed
-                    } else {
-                        0.0
-                    };
-                    (count_to_f32(now.plan.periods) - passed - count_to_f32(SPARE_PERIODS)).at_least(0.0)
-                });
                 if let Some(left) = left
                     && self.wait_pace == f32::MAX
                     && left > PERIODS_A_SEARCH
