@@ -26,6 +26,10 @@ const AFTER_CUT: f32 = 1.5;
 /// The greatest weight in the last steps, and how many those are.
 const BARRIER_AT_END: f32 = 7e-4;
 const STEPS_AT_END: u16 = 2;
+/// Share of the motion by which a whole step at the last weight still shortens it where it is not the last one; and share of what the motion takes more than the
+/// walk by which a step shortens it, whatever the one before it did.
+const UNSOLVED: f32 = 0.05;
+const SHORTENS: f32 = 0.125;
 /// The last weight with an end at speed: what the plan leaves of the limits is what the last stop before the end begins with.
 const BARRIER_LAST_AT_SPEED: f32 = 1e-3;
 /// Most steps from rest to rest; with an end at speed, and the fewest.
@@ -437,19 +441,22 @@ impl Planner {
         u16::try_from(truncated(steps)).unwrap_or(u16::MAX)
     }
 
-    /// Whether another step is to be taken, for which there is time, or which pays; chooses its barrier.
-    fn goes_on(&mut self, plan: &Plan, deadlines: Deadlines, pays: bool) -> bool {
+    /// Whether another step is to be taken, for which there is time, or which pays; chooses its barrier. `shorter`: periods by which the last one shortened the motion.
+    fn goes_on(&mut self, plan: &Plan, deadlines: Deadlines, shorter: f32) -> bool {
         if self.step < STEPS_FIRST {
             return true;
         }
         let lasts = self.lasts;
         let went = self.reach.step();
+        // A step that shortens the check by more than it takes itself costs nothing.
+        let walk = plan.step_s / (self.weight * plan.limits.period);
+        let pays = PERIODS_A_PLACE * shorter.at_least(SHORTENS * (lasts - walk)) > self.periods_of_step(plan);
         let last = if plan.pinned() == [0; 2] {
             BARRIER_LAST
         } else {
             BARRIER_LAST_AT_SPEED
         };
-        let is_solved = self.barrier <= last && went >= 1.0;
+        let is_solved = self.barrier <= last && went >= 1.0 && shorter < UNSOLVED * lasts;
         let may_go_on = self.steps_left(plan, lasts, deadlines) > 0 || (pays && self.step < STEPS_MAX);
         if is_solved || !may_go_on {
             return false;
@@ -477,13 +484,13 @@ impl Planner {
         true
     }
 
-    /// Periods that the motion takes at the pace as it is.
+    /// Periods that the motion takes at the pace as it is: by its values at the nodes. A coefficient may be much less than these.
     fn lasts(&self, plan: &Plan) -> f32 {
-        let count = usize::from(plan.intervals) + 2;
-        let sum: f32 = draft(&self.lists)
-            .iter()
-            .take(count)
-            .map(|pace| inverse_sqrt(pace.at_least(1e-9)))
+        let nodes = usize::from(plan.intervals) + 1;
+        let pace = draft(&self.lists);
+        let sum: f32 = (pace.iter().zip(pace.iter().skip(1)))
+            .take(nodes)
+            .map(|(here, next)| inverse_sqrt((0.5 * (here + next)).at_least(1e-9)))
             .sum();
         sum * plan.step_s / plan.limits.period
     }
@@ -517,9 +524,7 @@ impl Planner {
         self.taken = deadlines.spent;
         let before = self.lasts;
         self.lasts = self.lasts(plan);
-        // A step that shortens the check by more than it takes itself costs nothing.
-        let pays = PERIODS_A_PLACE * (before - self.lasts) > self.periods_of_step(plan);
-        if self.goes_on(plan, deadlines, pays) {
+        if self.goes_on(plan, deadlines, before - self.lasts) {
             return self.begin_step(plan);
         }
         self.begin_check(plan);

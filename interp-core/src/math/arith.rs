@@ -108,6 +108,15 @@ pub(crate) fn dot_hi(a: &[i32; 3], b: &[i32; 3]) -> i32 {
     add(add(mul_hi(a0, b0), mul_hi(a1, b1)), mul_hi(a2, b2))
 }
 
+/// A scalar product in units of 2^32, each product at most 2^61, to single precision: where [`dot_hi`] loses what `1 - r k` consists of.
+#[inline(always)]
+#[must_use]
+pub(crate) fn dot_float(a: &[i32; 3], b: &[i32; 3]) -> f32 {
+    let ([a0, a1, a2], [b0, b1, b2]) = (*a, *b);
+    let sum = add_product(add_product(a0 as i64 * b0 as i64, a1, b1), a2, b2);
+    to_f32((sum >> 32) as i32) + sum as u32 as f32 * UNIT_32
+}
+
 /// `sum + a b` in 64 bits: one `SMLAL` (1 cycle). The caller guarantees that it does not overflow.
 #[inline(always)]
 #[must_use]
@@ -545,6 +554,22 @@ mod tests {
         }
         std::println!("inverse root: {worst} ulp");
         assert!(worst < 1.5, "{worst} ulp");
+    }
+
+    #[test]
+    fn a_scalar_product_has_the_digits_of_single_precision() {
+        let a = [1_000_000_007, -900_000_011, 3];
+        for b in [
+            [31_000_000, 34_000_000, 5],
+            [2_000_000_000, -7, 11],
+            [-1, 1, 1],
+            [0; 3],
+        ] {
+            let exact: i64 = a.iter().zip(&b).map(|(a, b)| i64::from(*a) * i64::from(*b)).sum();
+            let exact = exact as f64 / 2_f64.powi(32);
+            let off = (f64::from(dot_float(&a, &b)) - exact).abs();
+            assert!(off <= 2e-7 * exact.abs(), "{b:?}: {off} of {exact}");
+        }
     }
 
     #[test]

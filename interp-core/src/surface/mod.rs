@@ -43,7 +43,7 @@ pub(crate) use revolved::{CirclePass, ProfilePass};
 pub(crate) use side_curve::SideCurve;
 
 use crate::fault::{Fault, FaultKind, Result};
-use crate::math::arith::{dot_hi, fraction_32, inverse_sqrt, power_of_two, sqrt, to_f32};
+use crate::math::arith::{dot_float, dot_hi, fraction_32, inverse_sqrt, power_of_two, sqrt, to_f32};
 use crate::math::vec3::Vec3;
 
 /// Least sine between the two first derivatives (after any flagged zero is divided out) at which a normal is computed.
@@ -236,9 +236,9 @@ impl Local {
 
         let product = ball.product() * self.g;
         let slant = b * f * inverse_e;
-        let l = to_f32(dot_hi(&offset, &self.path2)) * product;
+        let l = dot_float(&offset, &self.path2) * product;
         let (shear, shear_sum) = if MIXED {
-            let m = to_f32(dot_hi(&offset, &self.mixed)) * (0.5 * product);
+            let m = dot_float(&offset, &self.mixed) * (0.5 * product);
             let shear = m - slant * l;
             (shear, m + shear)
         } else {
@@ -254,7 +254,7 @@ impl Local {
             b * b * side.dot(side)
         };
         let (across, n) = if SIDE2 {
-            let n = b * (to_f32(dot_hi(&offset, &self.side2)) * product);
+            let n = b * (dot_float(&offset, &self.side2) * product);
             (lateral_squared - (n - sheared), n)
         } else {
             (lateral_squared + sheared, 0.0)

@@ -292,9 +292,10 @@ impl Walker {
                 if self.fits(lists, self.high, self.growth) || self.coarsenings >= COARSENINGS {
                     Stage::Bisect(0)
                 } else {
+                    // The usual spacing may fit now. The mean takes the nodes that are left over, and one longer than the rests would end them.
                     self.ends *= 1.5;
                     self.coarsenings += 1;
-                    Stage::Coarsen
+                    Stage::TryEven
                 }
             }
             Stage::Bisect(BISECTIONS..) => Stage::Times,

@@ -20,6 +20,10 @@ const SPACING_MAX: f32 = 0.1;
 /// Time between nodes that is worth its planning, s.
 const SPACING_WORTH: f32 = 4e-3;
 
+/// Shortest mean, in finest spacings: with an end at speed, and from rest to rest, where a shorter one makes slow plans beside a jump, which three periods see.
+const MEAN_MIN: f32 = 4.0;
+const MEAN_MIN_TO_REST: f32 = 20.0;
+
 /// Longest mean of a walk with an end at speed, s, and the time for which it has that speed, as a multiple of it.
 pub(super) const MEAN_MAX: f32 = 0.05;
 
@@ -48,10 +52,11 @@ impl Walker {
         self.mean_s = (self.acceleration / self.jerk)
             .at_most(1.2 * sqrt(length / time / self.jerk))
             .at_most(cube_root(0.5 * length / self.jerk));
-        if !self.is_from_rest_to_rest() {
-            self.mean_s = self.mean_s.at_most(MEAN_MAX);
-        }
-        self.mean_s = self.mean_s.at_least(4.0 * self.finest);
+        self.mean_s = if self.is_from_rest_to_rest() {
+            self.mean_s.at_least(MEAN_MIN_TO_REST * self.finest)
+        } else {
+            self.mean_s.at_most(MEAN_MAX).at_least(MEAN_MIN * self.finest)
+        };
     }
 
     /// As many intervals as are worth their planning, and no more than leave the plan longer than its planning, unless the tool waits for it and the
