@@ -68,7 +68,7 @@ pub fn path_and_crests(
     spacing_mm: f64,
 ) -> Result<(PathFigures, SweptResult), InspectError> {
     let oracle = Oracle::new(job)?;
-    let mut track = ToolPath::with_spacing(spacing_mm * 1e6);
+    let mut track = ToolPath::with_spacing(spacing_mm * 1e6, job.scallop_mm);
     // Held back until the next sample shows whether it is the last of its pass.
     let mut held: Option<PassSample> = None;
     let path = follow(job, prepared, &oracle, &mut |sample| {

@@ -159,13 +159,13 @@ fn measure<'a>(
     progress: &dyn Progress,
 ) -> Result<RunMeasurements, InspectError> {
     let oracle = oracle(job)?;
-    // With limits the feed is low at the ends of passes: samples closer than half the full step of a period are not stored.
+    // With limits the feed is low at the ends of passes: on straight parts samples closer than half the full step of a period are not stored.
     let spacing_nm = if job.machine.has_limits() {
         0.5e6 * job.feed_mm_s() * job.machine.period_s()
     } else {
         0.0
     };
-    let track = RefCell::new(ToolPath::with_spacing(spacing_nm));
+    let track = RefCell::new(ToolPath::with_spacing(spacing_nm, job.scallop_mm));
     let slow = RefCell::new(BTreeMap::<u32, Vec<(u64, f64)>>::new());
     let mut turn = TurnEnds::new(&oracle);
     let axes = RefCell::new(AxesUse::new(job));

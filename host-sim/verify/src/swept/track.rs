@@ -1,10 +1,17 @@
 //! The tool path of a run in compact form: 24 bytes per sample.
 
+use super::CHORD_SHARE;
 use glam::DVec3;
 use job::Along;
 use oracle::PassSample;
 
 const MM_PER_NM: f64 = 1e-6;
+const NM_PER_MM: f64 = 1e6;
+
+/// A sample further than this from the line on which the stored samples arrive is stored: twice the deviation of chords that is left
+/// anyway, and not below what rounding of the centres makes of a straight line.
+const BEND_SHARE: f64 = 2.0 * CHORD_SHARE;
+const BEND_MIN_NM: f64 = 4.0;
 
 /// One pass as emitted.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -55,6 +62,14 @@ impl ToolPathPass {
     pub(super) fn path_range(&self) -> Option<[f64; 2]> {
         let (first, last) = (*self.path.first()?, *self.path.last()?);
         Some([first.min(last), first.max(last)])
+    }
+
+    fn push(&mut self, tick: u64, path: f64, side: f64, cl_nm: [i32; 3]) {
+        self.periods
+            .push(u32::try_from(tick.saturating_sub(self.first_tick)).unwrap_or(u32::MAX));
+        self.path.push(path);
+        self.cl_nm.push(cl_nm);
+        self.add_side(side);
     }
 
     /// Adds the side parameter of the sample that was added last.
@@ -116,14 +131,40 @@ impl ToolPathPass {
     }
 }
 
+/// A sample that is not stored.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct LeftOut {
+    tick: u64,
+    path: f64,
+    side: f64,
+    cl_nm: [i32; 3],
+    /// Its distance from the last stored one.
+    apart_nm: f64,
+}
+
+/// How a sample lies to those stored.
+#[derive(Clone, Copy)]
+enum Lie {
+    /// Nearer to the last one than the minimum distance, nm, in the direction in which that was reached.
+    Near(f64),
+    /// Farther in that direction.
+    Far,
+    /// In another direction.
+    Beside,
+}
+
 /// The tool path of a run: written sample by sample, then read.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ToolPath {
     /// The passes, in order.
     pub passes: Vec<ToolPathPass>,
-    /// Minimum distance of stored samples, nm: nearer ones are left out, except the last of a pass. At low feed the samples are
-    /// denser than needed.
+    /// Minimum distance of stored samples, nm: nearer ones are left out where the path is straight, except the last of a pass. At low
+    /// feed the samples are denser than needed.
     spacing_nm: f64,
+    /// Greatest distance from the straight line of one left out, nm.
+    bend_nm: f64,
+    /// The sample before, if it is not stored.
+    left_out: Option<LeftOut>,
     /// The last centre of a turn, and the boundary there: it belongs to the pass that follows.
     lead_in: Option<([i32; 3], f64)>,
     /// The first centre of a turn, likewise: it belongs to the pass before.
@@ -131,31 +172,42 @@ pub struct ToolPath {
 }
 
 impl ToolPath {
-    /// An empty path with this minimum distance of samples, nm.
+    /// An empty path with this minimum distance of samples on straight parts, nm, for measuring scallops of this height.
     #[must_use]
-    pub fn with_spacing(spacing_nm: f64) -> Self {
+    pub fn with_spacing(spacing_nm: f64, scallop_mm: f64) -> Self {
         Self {
-            passes: Vec::new(),
             spacing_nm,
-            lead_in: None,
-            lead_out: None,
+            bend_nm: (BEND_SHARE * scallop_mm * NM_PER_MM).max(BEND_MIN_NM),
+            ..Self::default()
         }
     }
 
-    /// Whether a sample is nearer to the last one stored than the minimum distance.
-    fn is_near(&self, sample: &PassSample) -> bool {
-        let last = self.passes.last().and_then(|pass| pass.cl_nm.last());
-        !sample.last_of_pass
-            && last.is_some_and(|last| {
-                let apart = last
-                    .iter()
-                    .zip(sample.cl_nm)
-                    .map(|(a, b)| f64::from(*a) - f64::from(b));
-                apart.map(|d| d * d).sum::<f64>() < self.spacing_nm * self.spacing_nm
-            })
+    /// How a sample lies to those stored.
+    fn lie(&mut self, sample: &PassSample) -> Lie {
+        let Some(pass) = self.passes.last().filter(|_| !sample.first_of_pass) else {
+            return Lie::Far;
+        };
+        let Some(last) = pass.cl_nm.len().checked_sub(1) else {
+            return Lie::Far;
+        };
+        let stored = |index: usize| DVec3::from(pass.cl_nm[index].map(f64::from));
+        let by = DVec3::from(sample.cl_nm.map(f64::from)) - stored(last);
+        let apart = by.length();
+        let recedes = self.left_out.is_none_or(|left_out| apart >= left_out.apart_nm);
+        let direction = last.checked_sub(1).map_or(DVec3::ZERO, |before| {
+            (stored(last) - stored(before)).normalize_or_zero()
+        });
+        let is_straight = direction == DVec3::ZERO || by.distance(direction * apart) <= self.bend_nm;
+        if !is_straight || !recedes {
+            Lie::Beside
+        } else if apart < self.spacing_nm {
+            Lie::Near(apart)
+        } else {
+            Lie::Far
+        }
     }
 
-    /// Adds the next sample. Returns whether it was stored: it is not where it is near the last one.
+    /// Adds the next sample. Returns whether it was stored: it is not where it is near the last one on a straight part. The one left out before may be stored with it.
     pub fn add(&mut self, sample: &PassSample, along: Along) -> bool {
         let (path, side) = match along {
             Along::U => (sample.u, sample.v),
@@ -179,15 +231,24 @@ impl ToolPath {
                 self.push_turn(cl_nm, boundary);
             }
         }
-        if !sample.first_of_pass && self.is_near(sample) {
+        let lie = self.lie(sample);
+        if let (Lie::Near(apart_nm), false) = (lie, sample.last_of_pass) {
+            self.left_out = Some(LeftOut {
+                tick: sample.tick,
+                path,
+                side,
+                cl_nm: sample.cl_nm,
+                apart_nm,
+            });
             return false;
         }
+        let left_out = self.left_out.take();
         if let Some(pass) = self.passes.last_mut() {
-            pass.periods
-                .push(u32::try_from(sample.tick.saturating_sub(pass.first_tick)).unwrap_or(u32::MAX));
-            pass.path.push(path);
-            pass.cl_nm.push(sample.cl_nm);
-            pass.add_side(side);
+            // The path is straight up to the sample before.
+            if let (Lie::Beside, Some(before)) = (lie, left_out) {
+                pass.push(before.tick, before.path, before.side, before.cl_nm);
+            }
+            pass.push(sample.tick, path, side, sample.cl_nm);
         }
         if sample.last_of_pass
             && let Some((cl_nm, boundary)) = self.lead_out.take()
@@ -252,4 +313,63 @@ impl ToolPath {
 /// The component of a vector normal to a unit direction.
 pub(super) fn across(m: DVec3, direction: DVec3) -> DVec3 {
     m - direction * m.dot(direction)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The path that is stored of centres, mm, and the largest distance of one of them from it, mm.
+    fn stored(centres: &[DVec3]) -> (usize, f64) {
+        let mut track = ToolPath::with_spacing(10_000.0, 0.01);
+        for (tick, centre) in (0_u32..).zip(centres) {
+            let cl_nm = (*centre * NM_PER_MM).to_array().map(|nm| nm.round() as i32);
+            let sample = PassSample {
+                tick: u64::from(tick),
+                pass: 0,
+                u: f64::from(tick),
+                v: 0.0,
+                cc_nm: cl_nm,
+                cl_nm,
+                feed_mm_s: 1.0,
+                interval: 0.0,
+                first_of_pass: tick == 0,
+                last_of_pass: tick as usize + 1 == centres.len(),
+            };
+            track.add(&sample, Along::U);
+        }
+        let pass = &track.passes[0];
+        let chords: Vec<[DVec3; 2]> = (1..pass.cl_nm.len())
+            .map(|k| [pass.centre(k - 1), pass.centre(k)])
+            .collect();
+        let off = |centre: &DVec3| {
+            let distance = |[from, to]: &[DVec3; 2]| {
+                let way = *to - *from;
+                let share = ((*centre - *from).dot(way) / way.length_squared()).clamp(0.0, 1.0);
+                centre.distance(*from + way * share)
+            };
+            chords.iter().map(distance).fold(f64::INFINITY, f64::min)
+        };
+        (pass.cl_nm.len(), centres.iter().map(off).fold(0.0, f64::max))
+    }
+
+    /// A ball that hardly fits creeps around the bends of its centre's path: the samples there are the path, however close they are.
+    #[test]
+    fn samples_are_left_out_on_straight_parts_alone() {
+        let leg = |from: DVec3, turn_deg: f64| {
+            let direction = DVec3::new(turn_deg.to_radians().cos(), turn_deg.to_radians().sin(), 0.0);
+            (1..=97).map(move |k| from + direction * (0.001 * f64::from(k)))
+        };
+        for turn_deg in [0.0, 3.0, 30.0, 80.0, 180.0] {
+            let mut centres: Vec<DVec3> = leg(DVec3::ZERO, 0.0).collect();
+            centres.extend(leg(centres[96], turn_deg));
+            let (count, off) = stored(&centres);
+            assert!(count < 45, "{count} samples at {turn_deg} degrees");
+            // Up to the first sample behind the corner that is off the line; half a step where the path goes straight back.
+            assert!(
+                off < if turn_deg < 180.0 { 4e-5 } else { 1e-3 },
+                "{off} mm at {turn_deg} degrees"
+            );
+        }
+    }
 }
