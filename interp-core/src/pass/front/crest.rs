@@ -93,12 +93,16 @@ impl Tools<'_, '_> {
     ) -> CurvePoint {
         let point = self.front(table, columns, place);
         if point.at >= self.direction.end {
-            CurvePoint {
-                at: self.direction.end,
-                ..CurvePoint::default()
-            }
+            self.on_boundary()
         } else {
             point
+        }
+    }
+
+    fn on_boundary(&self) -> CurvePoint {
+        CurvePoint {
+            at: self.direction.end,
+            ..CurvePoint::default()
         }
     }
 }
@@ -180,6 +184,11 @@ impl CrestSearch {
         }
     }
 
+    /// From the point to a distance of a front, as a share of the whole side parameter.
+    fn rise(&self, at: i32) -> f32 {
+        to_f32(at.wrapping_sub(self.at)) * UNIT
+    }
+
     /// Height of the ball of a pass above the point, mm, and the interval that the ball is in.
     fn height<W: Deref<Target = [i32]>>(
         &self,
@@ -188,30 +197,37 @@ impl CrestSearch {
         columns: [Column; 2],
     ) -> (f32, u16) {
         let point = &self.point;
-        // The foot in the metric of the point.
+        // The foot in the metric of the point, on the front as if it went on beyond the boundary.
         let mut foot = self.place;
         let mut moved = 0.0;
-        let mut curve = tools.curve(table, columns, foot);
+        let mut curve = tools.front(table, columns, foot);
         let mut clamped = false;
         for _ in 0..FOOT_STEPS {
-            let rise = to_f32(curve.at.wrapping_sub(self.at)) * UNIT;
-            let stretch = point.stretch(curve.slope);
+            let rise = self.rise(curve.at);
             let gradient =
                 moved * point.a + rise * point.b + curve.slope * (moved * point.b + rise * point.c);
-            let by = -gradient / stretch;
+            let by = -gradient / point.stretch(curve.slope);
             if !by.is_finite() {
                 break;
             }
             (foot, clamped) = shifted(table, tools.job, foot, by);
             moved = offset(table, foot) - offset(table, self.place);
-            curve = tools.curve(table, columns, foot);
+            curve = tools.front(table, columns, foot);
         }
-        // Along the boundary lowering the front would not move the pass.
-        let (interval, _) = if curve.at < tools.direction.end {
-            foot
-        } else {
-            self.place
-        };
+        let mut interval = foot.0;
+        if curve.at >= tools.direction.end {
+            // The pass along the boundary, which lowering the front would not move.
+            interval = self.place.0;
+            curve = tools.on_boundary();
+            let by = -self.rise(curve.at) * point.b / point.a;
+            (foot, clamped) = shifted(
+                table,
+                tools.job,
+                self.place,
+                if by.is_finite() { by } else { 0.0 },
+            );
+            moved = offset(table, foot) - offset(table, self.place);
+        }
         let Ok(ball) = tools.frame(table, foot, curve.at) else {
             return (f32::INFINITY, interval);
         };
@@ -223,7 +239,7 @@ impl CrestSearch {
             middle: point.offset.dot(chord + ball.offset) / radius,
         };
         // A Newton step to the deepest ball: gradient of the power along the pass, and its second derivative.
-        let rise = to_f32(curve.at.wrapping_sub(self.at)) * UNIT;
+        let rise = self.rise(curve.at);
         let tangent = ball.path + ball.side * curve.slope;
         let bent = (ball.e - ball.a) * moved
             + (ball.f - ball.b) * (rise + curve.slope * moved)
