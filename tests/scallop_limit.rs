@@ -8,7 +8,7 @@ pub(crate) mod shapes;
 use std::path::PathBuf;
 
 use cad::{JobOptions, Options, machinable, read, write_job};
-use job::{Along, Job, NurbsSpec, Pattern, Side, Spacing, SurfaceSpec};
+use job::{Along, AxisLimits, Job, NurbsSpec, Pattern, Side, Spacing, SurfaceSpec};
 use verify::swept::{ERROR_SHARE_MAX, Requirements, SweptResult, measure};
 
 use crate::swept::{Followed, follow};
@@ -151,6 +151,44 @@ fn random_job(difficulty: Difficulty, random: &mut Random) -> Job {
     }
 }
 
+/// Half a cone of this height, its tip on the first line or on the last one, with axis limits.
+fn cone(height_mm: f64, tip_is_last: bool) -> Job {
+    let (sign, u) = if tip_is_last {
+        (-1.0, [-1.0, 0.0])
+    } else {
+        (1.0, [0.0, 1.0])
+    };
+    let mut job = random_job(Difficulty::Plain, &mut Random(1));
+    job.surface = SurfaceSpec::Revolved {
+        radius_mm: [0.0, 0.0, 20.0 * sign, 0.0],
+        height_mm: [0.0, 0.0, -height_mm * sign, 0.0],
+        u,
+        v_rad: [-std::f64::consts::PI, 0.0],
+    };
+    (job.radius_mm, job.scallop_mm, job.feed_mm_min) = (5.0, 0.02, 1200.0);
+    (job.along, job.pattern) = (job::Along::V, Pattern::Zigzag);
+    job.machine.limits = Some(AxisLimits::DEFAULT);
+    job
+}
+
+/// Within limits the ball stands on the tip with one normal of the many there: with a whole step-over beside it the crest was up to four times the limit.
+#[test]
+fn tips_of_cones() {
+    for height_mm in [0.3, 2.0, 10.0, 20.0] {
+        for tip_is_last in [false, true] {
+            let job = cone(height_mm, tip_is_last);
+            let followed = follow(&job);
+            let (excess, error) = excess(&job, &measured_of(&job, &followed));
+            assert!(
+                excess <= error,
+                "{height_mm} mm high: {excess} above the limit, within {error}"
+            );
+            let passes = followed.oracle.schedule().unwrap().len();
+            assert_eq!(followed.track.passes.len(), passes, "{height_mm} mm high");
+        }
+    }
+}
+
 fn check_random(difficulty: Difficulty, seed: u64) {
     let mut random = Random(seed);
     for case in 0..8 {
@@ -228,8 +266,7 @@ fn difficult_surfaces() {
     for seed in 0..35 {
         add_case(seed, &mut campaign);
     }
-    // Its point is that of a cone: see docs/limits.md.
-    assert!(campaign.above == [17] && campaign.held >= 25, "{campaign:?}");
+    assert!(campaign.above.is_empty() && campaign.held >= 25, "{campaign:?}");
 }
 
 /// Prints what is above the limit; `ISOFEED_CASES` sets the number of surfaces, 350 without.
@@ -242,7 +279,6 @@ fn campaign_of_difficult_surfaces() {
         add_case(seed, &mut campaign);
     }
     println!("{campaign:?}");
-    // The tip of a cone, and weights that vary by more than 2 : 1 from pole to pole: see docs/limits.md.
-    let is_known = |seed: &u64| [17, 201].contains(seed);
-    assert!(campaign.above.iter().all(is_known), "{campaign:?}");
+    // Weights that vary by more than 2 : 1 from pole to pole: see docs/limits.md.
+    assert!(campaign.above.iter().all(|seed| *seed == 201), "{campaign:?}");
 }

@@ -134,6 +134,8 @@ pub struct Oracle {
     pub feed_mm_s: f64,
     /// Whether turns beyond the boundary join the passes: these then begin and end within a period's step of it.
     pub overruns: bool,
+    /// Whether there are axis limits: a boundary that is a single point is then cut with one normal.
+    pub has_limits: bool,
     /// The region that is machined; `None` for the whole surface.
     pub region: Option<RegionEdges>,
     /// What of it is machined line by line, one after the other.
@@ -187,6 +189,7 @@ impl Oracle {
             period_s: job.machine.period_s(),
             feed_mm_s: job.feed_mm_s(),
             overruns: job.overrun_mm > 0.0 && job.pattern == Pattern::Zigzag && job.machine.has_limits(),
+            has_limits: job.machine.has_limits(),
         })
     }
 
@@ -224,7 +227,7 @@ impl Oracle {
     }
 
     /// Whether the line at a side parameter is a point.
-    fn is_point(&self, side: f64) -> bool {
+    pub(crate) fn is_point(&self, side: f64) -> bool {
         let [low, high] = self.path_range();
         let [first, last] = self.side_range();
         let (u, v) = self.swapped(0.5 * (low + high), side);

@@ -330,11 +330,12 @@ impl Oracle {
 
     /// Intervals that are passes whatever the parametrisation.
     pub(super) fn certain_intervals(&self, side: f64) -> Vec<[f64; 2]> {
+        // Without a region a line has one, also where it is a point.
+        let Some(region) = &self.region else {
+            return self.intervals(side);
+        };
         let least_mm = CERTAIN_SHARE * (8.0 * self.radius_mm * self.scallop_mm).sqrt();
-        let rounding = self
-            .region
-            .as_ref()
-            .map_or(0.0, |region| NEAR_PLACES * region.place[0]);
+        let rounding = NEAR_PLACES * region.place[0];
         let is_long = |interval: &[f64; 2]| {
             let length = interval[1] - interval[0];
             self.interval_mm(*interval, side) * (1.0 - rounding / length) > least_mm

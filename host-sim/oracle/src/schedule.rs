@@ -29,6 +29,8 @@ const LOCATION_ERROR_SHARE: f64 = 1.0 / 16_777_216.0;
 const HEIGHT_SHARE_MIN: f64 = 0.5;
 /// Newton iterations for the root of a cubic: more than needed.
 const NEWTON_STEPS: u8 = 12;
+/// Part of a step-over that a pass leaves within the limit without the next one; the core's value.
+const ALONE: f64 = 0.49;
 /// Largest number of passes of a schedule.
 const PASSES_MAX: usize = 1_000_000;
 
@@ -75,6 +77,7 @@ impl Oracle {
                 Spacing::Exact | Spacing::Constant(_) => self.exact_interval(side, &before)?,
             };
             steps.push(interval);
+            let interval = self.beside_point(side, interval);
             let intervals = self.certain_intervals(side).into_iter();
             passes.extend(intervals.map(|ends| ScheduledPass { side, ends, interval }));
             if side >= end {
@@ -101,6 +104,23 @@ impl Oracle {
             side = next;
         }
         Err(OracleError::TooManyPasses)
+    }
+
+    /// A step beside a boundary that is cut with one normal: half of it, from the point and to it.
+    fn beside_point(&self, side: f64, step: f64) -> f64 {
+        let one_normal = self.has_limits && self.spacing == Spacing::Exact && self.region.is_none();
+        let [start, end] = self.pass_range();
+        if !one_normal {
+            return step;
+        }
+        let room = end - side;
+        if side == start && self.is_point(start) {
+            ALONE * step
+        } else if step >= room && room > 0.5 * step && self.is_point(end) {
+            room - ALONE * step
+        } else {
+            step
+        }
     }
 
     /// Largest step from the pass at `side` to the next; `before`: steps of the previous passes, the last one first.

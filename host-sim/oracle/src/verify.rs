@@ -142,7 +142,8 @@ impl Verifier {
                 self.on_line.push(ends);
                 !self.cell.is_interval(ends, side)
             } else {
-                self.is_off(sample, path, side, self.pass_ends(sample.pass)[1])
+                let is_one_sample = sample.first_of_pass && self.oracle.is_point(side);
+                !is_one_sample && self.is_off(sample, path, side, self.pass_ends(sample.pass)[1])
             };
             if is_off {
                 self.report.off_boundary += 1;

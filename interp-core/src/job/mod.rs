@@ -114,22 +114,31 @@ pub enum Spacing {
     ConstantFromMiddle = 3,
     /// The same from the last side boundary to the first.
     ConstantFromEnd = 4,
+    /// As [`Self::Exact`], where the last side boundary is a single point: within axis limits it is one sample with one normal, and the step to it is half as long.
+    ExactToPoint = 5,
 }
 
 impl Spacing {
     /// Every rule, in order of its code.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 6] = [
         Self::Exact,
         Self::FirstOrder,
         Self::Constant,
         Self::ConstantFromMiddle,
         Self::ConstantFromEnd,
+        Self::ExactToPoint,
     ];
 
     /// The rule with this code.
     #[must_use]
     pub fn from_code(code: u8) -> Option<Self> {
         Self::ALL.into_iter().find(|spacing| *spacing as u8 == code)
+    }
+
+    /// Whether the step to the next pass is that of the whole gap.
+    #[must_use]
+    pub const fn is_exact(self) -> bool {
+        matches!(self, Self::Exact | Self::ExactToPoint)
     }
 
     /// Whether the passes are curves of constant scallop height.

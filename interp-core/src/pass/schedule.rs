@@ -2,6 +2,7 @@
 //! boundary; the last pass lies exactly on it.
 
 use crate::fault::{Fault, FaultKind, Result};
+use crate::job::{Header, Spacing};
 use crate::math::arith::{fraction_32, fraction_from_f32, fraction_to_f32};
 use crate::sample::SpanParameter;
 
@@ -69,6 +70,37 @@ pub(crate) fn apart(from: SpanParameter, to: SpanParameter, width: impl Fn(u16) 
         sum += width(span);
     }
     sum
+}
+
+/// Part of a step-over from a pass that its own balls leave within the scallop limit.
+const ALONE: f32 = 0.49;
+
+/// A step beside a boundary that is a single point, which is cut with one normal: from it, where the pass `is_point`, and to it.
+pub(crate) fn beside_point(
+    header: &Header,
+    step: f32,
+    from: SpanParameter,
+    is_point: bool,
+    width: impl Fn(u16) -> f32,
+) -> f32 {
+    let alone = ALONE * step;
+    if is_point {
+        return alone;
+    }
+    if header.spacing != Spacing::ExactToPoint {
+        return step;
+    }
+    let end = SpanParameter {
+        span: header.side_spans.saturating_sub(1),
+        fraction: u64::MAX,
+    };
+    let room = apart(from, end, width);
+    // Another pass in between, from which it is a part of a step-over.
+    if step >= room && room > 0.5 * step {
+        room - alone
+    } else {
+        step
+    }
 }
 
 /// Whether a pass at this side parameter is the last.

@@ -150,6 +150,14 @@ pub(super) fn spacing_from_edge(job: &Job, prepared: &Prepared) -> Spacing {
     }
 }
 
+/// The spacing of straight passes within axis limits.
+pub(super) fn exact_spacing(job: &Job, prepared: &Prepared) -> Spacing {
+    match side_poles(job, prepared) {
+        [_, true] => Spacing::ExactToPoint,
+        _ => Spacing::Exact,
+    }
+}
+
 /// Whether the first and the last side boundary are single points.
 fn side_poles(job: &Job, prepared: &Prepared) -> [bool; 2] {
     let widths = prepared.path.spans() + prepared.side.spans();

@@ -485,7 +485,7 @@ impl Lookahead {
             return Ok(true);
         }
         let step = match header.spacing {
-            Spacing::Exact => {
+            Spacing::Exact | Spacing::ExactToPoint => {
                 let estimator = estimator.as_deref_mut();
                 estimator.map_or(out.interval, |estimator| estimator.step(header, self.maximum))
             }
@@ -500,6 +500,13 @@ impl Lookahead {
             return Ok(!lines.go_on(job, step, rows)?);
         }
         if !schedule::is_last(out.route.side, header.side_spans) {
+            let step = if header.spacing.is_exact() {
+                schedule::beside_point(header, step, out.route.side, out.point, |span| {
+                    job.side_width(span)
+                })
+            } else {
+                step
+            };
             let side = match estimator {
                 Some(estimator) => estimator.next_side(job, out.route.side, step)?,
                 None => out.route.side,
@@ -513,7 +520,7 @@ impl Lookahead {
 
 /// Whether the first pass is to be looked at again for the step-over.
 fn looks_again(job: &Job<'_>, estimator: Option<&mut StepOverEstimator>) -> bool {
-    let estimator = estimator.filter(|_| job.header.spacing == Spacing::Exact);
+    let estimator = estimator.filter(|_| job.header.spacing.is_exact());
     estimator.is_some_and(|estimator| estimator.looks_again(job.header))
 }
 

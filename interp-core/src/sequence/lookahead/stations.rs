@@ -4,7 +4,7 @@ use super::{CELL_KEPT_MM, Lookahead, PATCHES, PassPlan, Task, check_crease, chec
 use crate::fault::{Fault, FaultKind, Result};
 use crate::feed::stations::{CELLS_MANY, Derivatives, Station, WINDOW, Window, parts_of_cell};
 use crate::job::program::Job;
-use crate::job::{AxisLimits, Spacing, SurfaceKind};
+use crate::job::{AxisLimits, SurfaceKind};
 use crate::math::arith::{fraction_to_f32, sqrt, truncated};
 use crate::math::number::{Bounded, MM_PER_NM, nm_to_mm, to_f32};
 use crate::pass::step_over::{PassMaximum, StepOverEstimator};
@@ -224,7 +224,7 @@ impl Lookahead {
         let first = self.station == 0;
         let begins = first && self.patches == 0;
         let ends = self.is_end() && out.route.next(job, &self.piece).is_none();
-        let estimator = estimator.filter(|_| job.header.spacing == Spacing::Exact);
+        let estimator = estimator.filter(|_| job.header.spacing.is_exact());
         Task::Estimate(estimator.map_or(0, |estimator| estimator.evaluations(first, begins, ends)))
     }
 
