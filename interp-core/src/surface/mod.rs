@@ -236,9 +236,9 @@ impl Local {
 
         let product = ball.product() * self.g;
         let slant = b * f * inverse_e;
-        let l = dot_float(&offset, &self.path2) * product;
+        let l = to_f32(dot_hi(&offset, &self.path2)) * product;
         let (shear, shear_sum) = if MIXED {
-            let m = dot_float(&offset, &self.mixed) * (0.5 * product);
+            let m = to_f32(dot_hi(&offset, &self.mixed)) * (0.5 * product);
             let shear = m - slant * l;
             (shear, m + shear)
         } else {
