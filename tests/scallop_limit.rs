@@ -8,7 +8,7 @@ pub(crate) mod shapes;
 use std::path::PathBuf;
 
 use cad::{JobOptions, Options, machinable, read, write_job};
-use job::{Along, AxisLimits, Job, NurbsSpec, Pattern, Side, Spacing, SurfaceSpec};
+use job::{Along, AxisLimits, Job, NurbsSpec, Pattern, Region, Side, Spacing, SurfaceSpec};
 use verify::swept::{ERROR_SHARE_MAX, Requirements, SweptResult, measure};
 
 use crate::swept::{Followed, follow};
@@ -185,6 +185,16 @@ fn tips_of_cones() {
             );
             let passes = followed.oracle.schedule().unwrap().len();
             assert_eq!(followed.track.passes.len(), passes, "{height_mm} mm high");
+
+            // A region of all of it, half a step-over from whose boundary the crest is not measured, has the same passes.
+            let mut region = job.clone();
+            let [[u0, u1], [v0, v1]] = job.surface.domain();
+            region.region = Some(Region::new(vec![vec![[u0, v0], [u1, v0], [u1, v1], [u0, v1]]]));
+            let found = follow(&region).track;
+            assert_eq!(found.passes.len(), passes, "{height_mm} mm high");
+            for (one, other) in found.passes.iter().zip(&followed.track.passes) {
+                assert!((one.side - other.side).abs() < 1e-4, "{height_mm} mm high");
+            }
         }
     }
 }

@@ -108,7 +108,7 @@ impl Oracle {
 
     /// A step beside a boundary that is cut with one normal: half of it, from the point and to it.
     fn beside_point(&self, side: f64, step: f64) -> f64 {
-        let one_normal = self.has_limits && self.spacing == Spacing::Exact && self.region.is_none();
+        let one_normal = self.has_limits && self.spacing == Spacing::Exact;
         let [start, end] = self.pass_range();
         if !one_normal {
             return step;

@@ -237,9 +237,14 @@ impl RegionLines {
             None => {
                 let width = |span| job.side_width(span);
                 let from = place_from(side);
+                let step = if cell.last() == end_of(job.header.side_spans) {
+                    schedule::to_point(job.header, self.step, from, width)
+                } else {
+                    self.step
+                };
                 let at = match rows {
-                    Some(rows) => rows.next_side(job.header, from, self.step, width),
-                    None => schedule::next_side(from, self.step, job.header.side_spans, width),
+                    Some(rows) => rows.next_side(job.header, from, step, width),
+                    None => schedule::next_side(from, step, job.header.side_spans, width),
                 };
                 let at = at?;
                 // At the end of the window the line stays in its last row.

@@ -75,18 +75,13 @@ pub(crate) fn apart(from: SpanParameter, to: SpanParameter, width: impl Fn(u16) 
 /// Part of a step-over from a pass that its own balls leave within the scallop limit.
 const ALONE: f32 = 0.49;
 
-/// A step beside a boundary that is a single point, which is cut with one normal: from it, where the pass `is_point`, and to it.
-pub(crate) fn beside_point(
-    header: &Header,
-    step: f32,
-    from: SpanParameter,
-    is_point: bool,
-    width: impl Fn(u16) -> f32,
-) -> f32 {
-    let alone = ALONE * step;
-    if is_point {
-        return alone;
-    }
+/// The step from a pass that is a single point, which is cut with one normal.
+pub(crate) fn from_point(step: f32) -> f32 {
+    ALONE * step
+}
+
+/// A step that may lead to the last boundary where that is a single point: only from a part of a step-over, so that another pass lies in between.
+pub(crate) fn to_point(header: &Header, step: f32, from: SpanParameter, width: impl Fn(u16) -> f32) -> f32 {
     if header.spacing != Spacing::ExactToPoint {
         return step;
     }
@@ -95,9 +90,8 @@ pub(crate) fn beside_point(
         fraction: u64::MAX,
     };
     let room = apart(from, end, width);
-    // Another pass in between, from which it is a part of a step-over.
     if step >= room && room > 0.5 * step {
-        room - alone
+        room - ALONE * step
     } else {
         step
     }

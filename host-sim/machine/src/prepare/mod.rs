@@ -188,7 +188,7 @@ pub fn prepare(job: &Job) -> Result<Prepared, JobError> {
         prepared.header.spacing = fronts::spacing_from_edge(job, &prepared);
     }
     prepared.header.axes = axes::axes(job, sign, start)?;
-    if prepared.header.spacing == Spacing::Exact && prepared.header.axes.is_some() && job.region.is_none() {
+    if prepared.header.spacing == Spacing::Exact && prepared.header.axes.is_some() {
         prepared.header.spacing = fronts::exact_spacing(job, &prepared);
     }
     fronts::check(job, &prepared)?;

@@ -495,18 +495,17 @@ impl Lookahead {
                 return Ok(true);
             }
         };
+        let step = if out.point && header.spacing.is_exact() {
+            schedule::from_point(step)
+        } else {
+            step
+        };
         if header.edges > 0 {
             let rows = estimator.as_deref().map(StepOverEstimator::rows);
             return Ok(!lines.go_on(job, step, rows)?);
         }
         if !schedule::is_last(out.route.side, header.side_spans) {
-            let step = if header.spacing.is_exact() {
-                schedule::beside_point(header, step, out.route.side, out.point, |span| {
-                    job.side_width(span)
-                })
-            } else {
-                step
-            };
+            let step = schedule::to_point(header, step, out.route.side, |span| job.side_width(span));
             let side = match estimator {
                 Some(estimator) => estimator.next_side(job, out.route.side, step)?,
                 None => out.route.side,
