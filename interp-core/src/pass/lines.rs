@@ -237,7 +237,8 @@ impl RegionLines {
             None => {
                 let width = |span| job.side_width(span);
                 let from = place_from(side);
-                let step = if cell.last() == end_of(job.header.side_spans) {
+                // The last line lies on the boundary, or a place below it.
+                let step = if cell.last() + 1 >= end_of(job.header.side_spans) {
                     schedule::to_point(job.header, self.step, from, width)
                 } else {
                     self.step
