@@ -577,7 +577,7 @@ mod tests {
     fn codes_out_of_range_are_no_header() {
         let good = [1, 1, 0, 0, 0, 0, 1, 1];
         let rest = [0; 4 * 4 + 1 + 1 + 1 + 1 + 1 + 1 + 8];
-        for (place, code) in [(2, 4), (3, 2), (4, 5), (5, 2)] {
+        for (place, code) in [(2, 4), (3, 2), (4, 6), (5, 2)] {
             let mut payload = [0; 8 + 30];
             payload[..8].copy_from_slice(&good);
             payload[8..].copy_from_slice(&rest);
