@@ -104,11 +104,11 @@ fn runs(board: &'static Board, name: &str, changes: &[(&str, &str)], home: &str,
         "{}, {name}: {tick}; {receive}; {}; {} cycles",
         board.id, ended.report["exti0"], ended.report["byte_wait_max_cycles"]
     );
-    // Only the receive interrupt and a critical section of the idle task delay a tick; the planning is over long before.
-    assert!(
-        tick["latency_max_cycles"].as_u64().unwrap() < 10 * CYCLES_US,
-        "{tick}"
-    );
+    // Only the receive interrupt and a critical section of the idle task delay a tick; the planning is over long before. Before the run that may be the check of
+    // a record of the job.
+    let latency = |name: &str| tick[name].as_u64().unwrap();
+    assert!(latency("latency_moving_max_cycles") < 10 * CYCLES_US, "{tick}");
+    assert!(latency("latency_max_cycles") < 50 * CYCLES_US, "{tick}");
     // The planning waits for the tick that pends it, and takes a quarter of the period at most, with the bytes that are received meanwhile.
     let planning = &ended.report["exti0"];
     assert!(planning["count"].as_u64().unwrap() > 100, "{planning}");

@@ -244,7 +244,7 @@ mod app {
     /// |---|---|
     /// | priority | 3: the port has no FIFO, and a tick may take 18 byte times |
     /// | period | 11 us at 921 600 baud, while the host sends |
-    /// | worst case | a few dozen cycles, and the few instructions that hold all interrupts off; a line of the log does not |
+    /// | worst case | a few dozen cycles, and the few instructions that hold all interrupts off; a line of the log does not; a word that is written to flash, 16 us, holds the program |
     /// | a miss | the byte is lost and counted; its frame fails its check, and the host repeats it |
     #[task(binds = USART1, priority = 3, local = [receiver, bytes_in])]
     fn receive(context: receive::Context) {

@@ -335,7 +335,7 @@ impl Ended {
         );
     }
 
-    /// No byte of the host was lost, and each was read within half of a byte's time.
+    /// No byte of the host was lost, and each was read within half of a byte's time: but for words that were written to flash meanwhile, which take longer than a byte.
     pub(super) fn no_byte_lost(&self) {
         assert_eq!(self.number("bytes_lost"), 0, "{:#}", self.report["notes"]);
         let wait = self.number("byte_wait_max_cycles");

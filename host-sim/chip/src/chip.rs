@@ -100,6 +100,7 @@ pub(crate) struct Chip {
     pub(crate) slots_from: Option<u64>,
     /// Bytes that were lost before the last reset.
     pub(crate) overruns: u64,
+    pub(crate) lost_to_flash: u64,
     pub(crate) resets: u32,
     wall: Instant,
     wall_offset: f64,
@@ -188,6 +189,7 @@ impl Chip {
             periods: 0,
             slots_from: None,
             overruns: 0,
+            lost_to_flash: 0,
             resets: 0,
             wall: Instant::now(),
             wall_offset: 0.0,
@@ -200,10 +202,12 @@ impl Chip {
         self.world.event(self.world.now, "reset");
         self.world.set_hclk(Rcc::RESET_HZ);
         self.overruns += self.usart.overruns;
+        self.lost_to_flash += self.usart.lost_to_flash;
         self.resets += 1;
         let from_host = std::mem::take(&mut self.usart.from_host);
         self.rcc = Rcc::new(self.options.hse_mhz * 1e6, !self.options.no_crystal, flags);
         self.nvic = Nvic::new();
+        self.nvic.moves = self.moved.is_some();
         (self.tim1, self.tim2, self.tim5) = (
             Timer::new("TIM1", 0xffff),
             Timer::new("TIM2", u32::MAX),
@@ -284,6 +288,7 @@ impl Chip {
         let (before, since) = std::mem::replace(&mut self.step_edge, (pins, at));
         if before & pins != 0 && at - since <= self.world.lasting(PULSE_MAX_S) {
             self.moved = Some(self.world.seconds(since));
+            self.nvic.moves = true;
             self.world.note("the first step pulse");
             self.plan();
         }

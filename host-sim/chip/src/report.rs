@@ -33,6 +33,7 @@ fn interrupt(chip: &Chip, line: usize) -> Value {
     json!({
         "count": account.count,
         "latency_max_cycles": account.latency_max,
+        "latency_moving_max_cycles": account.latency_moving,
         "latency_mean_cycles": account.latency_sum as f64 / account.count.max(1) as f64,
         "longest_cycles": account.duration_max,
     })
@@ -68,6 +69,7 @@ pub(crate) fn of(chip: &Chip, account: &Account, seconds_spent: f64) -> Value {
         "bytes_sent": chip.usart.sent,
         "bytes_received": chip.usart.received,
         "bytes_lost": chip.overruns + chip.usart.overruns,
+        "bytes_lost_to_flash": chip.lost_to_flash + chip.usart.lost_to_flash,
         "bytes_unheard": chip.usart.unheard,
         "byte_wait_max_cycles": chip.usart.longest_wait,
         "slots_played": chip.dma.played,

@@ -12,6 +12,8 @@ const KEPT: usize = 200;
 pub(crate) struct World {
     /// Now, in cycles.
     pub(crate) now: u64,
+    /// Begin and end of the last operation of the flash, cycles: the program stands, which is in the same flash.
+    pub(crate) flash_busy: [u64; 2],
     hclk_hz: f64,
     /// Start of the present frequency, cycles and seconds.
     since: (u64, f64),
@@ -32,6 +34,7 @@ impl World {
     pub(crate) fn new(hclk_hz: f64, verbose: bool) -> Self {
         Self {
             now: 0,
+            flash_busy: [0; 2],
             hclk_hz,
             since: (0, 0.0),
             complaints: Vec::new(),
@@ -41,6 +44,13 @@ impl World {
             verbose,
             once: BTreeSet::new(),
         }
+    }
+
+    /// Lets the time of an operation of the flash pass.
+    pub(crate) fn flash_works(&mut self, cycles: u64) {
+        let begin = self.now;
+        self.now += cycles;
+        self.flash_busy = [begin, self.now];
     }
 
     /// The present frequency, Hz.

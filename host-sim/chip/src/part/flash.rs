@@ -156,7 +156,7 @@ impl Flash {
         };
         self.sectors[from + part.start..from + part.end].fill(0xff);
         self.erased += u64::from(whole);
-        world.now += if whole { lasts } else { lasts / 3 };
+        world.flash_works(if whole { lasts } else { lasts / 3 });
     }
 
     /// The word at an address within the sectors.
@@ -193,6 +193,6 @@ impl Flash {
             // What is cut short has some of its bits.
             *byte &= value | if whole { 0 } else { 0x5a };
         }
-        world.now += lasts;
+        world.flash_works(lasts);
     }
 }

@@ -28,9 +28,11 @@ struct Active {
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Account {
     pub(crate) count: u64,
-    /// Maximum latency from request to first instruction, and maximum duration, cycles.
+    /// Maximum latency from request to first instruction, the same from the first step pulse on, and sum, cycles.
     pub(crate) latency_max: u64,
+    pub(crate) latency_moving: u64,
     pub(crate) latency_sum: u64,
+    /// Maximum duration, cycles.
     pub(crate) duration_max: u64,
 }
 
@@ -40,6 +42,8 @@ pub(crate) struct Nvic {
     priorities: [u8; 128],
     raised: [u64; LINES],
     accounts: [Account; LINES],
+    /// Whether there was a step pulse.
+    pub(crate) moves: bool,
     active: Vec<Active>,
     vtor: u32,
     ccr: u32,
@@ -64,6 +68,7 @@ impl Nvic {
             priorities: [0; 128],
             raised: [0; LINES],
             accounts: [Account::default(); LINES],
+            moves: false,
             active: Vec::new(),
             vtor: 0,
             ccr: 0x200,
@@ -144,6 +149,9 @@ impl Nvic {
             account.count += 1;
             account.latency_sum += latency;
             account.latency_max = account.latency_max.max(latency);
+            if self.moves {
+                account.latency_moving = account.latency_moving.max(latency);
+            }
         }
     }
 

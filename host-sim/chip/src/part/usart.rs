@@ -18,6 +18,9 @@ const NOT_MODELLED: u32 = 1 << 4 | 1 << 6 | 1 << 7 | 1 << 8 | 1 << 9 | 1 << 10 |
 /// Bits of a byte on the line.
 const BITS: u64 = 10;
 
+/// Cycles in which the interrupt reads the byte that came while the flash worked.
+const READ_CYCLES: u64 = 200;
+
 pub(crate) struct Usart {
     status: u32,
     divider: u32,
@@ -35,10 +38,11 @@ pub(crate) struct Usart {
     arrived: u64,
     pub(crate) sent: u64,
     pub(crate) received: u64,
-    /// Lost bytes, lost frame delimiters among them, and bytes received while the port was off.
+    /// Lost bytes, lost frame delimiters among them: because the program did not read them, and because the flash worked; and bytes received while the port was off.
     pub(crate) overruns: u64,
+    pub(crate) lost_to_flash: u64,
     pub(crate) unheard: u64,
-    /// Maximum time from a byte's arrival to its read, cycles.
+    /// Maximum time from a byte's arrival to its read, apart from operations of the flash, cycles.
     pub(crate) longest_wait: u64,
 }
 
@@ -58,6 +62,7 @@ impl Usart {
             sent: 0,
             received: 0,
             overruns: 0,
+            lost_to_flash: 0,
             unheard: 0,
             longest_wait: 0,
         }
@@ -92,7 +97,12 @@ impl Usart {
             self.unheard += 1;
         } else if self.status & RECEIVED != 0 {
             self.status |= OVERRUN;
-            self.overruns += 1;
+            let [begin, end] = world.flash_busy;
+            if (begin..=end + READ_CYCLES).contains(&at) {
+                self.lost_to_flash += 1;
+            } else {
+                self.overruns += 1;
+            }
             let end = if byte == 0 { ", a frame's end" } else { "" };
             world.note(format!(
                 "USART1: a byte is lost{end}; the program is at {program:#x}"
@@ -125,7 +135,9 @@ impl Usart {
             0x00 => self.status,
             0x04 => {
                 if self.status & RECEIVED != 0 {
-                    self.longest_wait = self.longest_wait.max(world.now.saturating_sub(self.arrived));
+                    let [_, flash_end] = world.flash_busy;
+                    let waits = world.now.saturating_sub(self.arrived.max(flash_end));
+                    self.longest_wait = self.longest_wait.max(waits);
                 }
                 self.status &= !(RECEIVED | OVERRUN);
                 self.data.into()
