@@ -3,6 +3,7 @@
 //! [`Sequencer::tick`] moves the tool by one period. [`Sequencer::plan`] plans, a fixed portion a period: a change of the pace, the link to the next
 //! pass, the next pass. A pass is slowed down where the pass after it would not be planned in time.
 
+mod in_time;
 mod next_step;
 mod on_pass;
 mod planning;

@@ -1,151 +1,19 @@
 //! The planner on paths that are known in closed form, in f64.
 
-use std::boxed::Box;
+mod path;
+
 use std::vec::Vec;
 
 use super::curve::{Curve, CurveLimits};
-use super::deadlines::Deadlines;
 use super::follow::Follower;
 use super::limits::MotionLimits;
 use super::pace::{Course, Pace};
 use super::plan::Plan;
-use super::planner::Planner;
 use super::profile::Profiles;
-use super::stations::Station;
 use crate::job::AxisLimits;
+use path::Path;
 
 const T: f64 = 1e-3;
-
-/// A path: position and its derivatives by arc, in pieces with a jump between them.
-struct Path {
-    /// Arc at the start of each piece, and at the end.
-    ends: Vec<f64>,
-    /// The piece's value or derivative of this order at an arc.
-    of: Box<dyn Fn(usize, f64, usize) -> [f64; 3]>,
-}
-
-impl Path {
-    fn smooth(length: f64, of: impl Fn(f64, usize) -> [f64; 3] + 'static) -> Self {
-        Self {
-            ends: std::vec![0.0, length],
-            of: Box::new(move |_, s, order| of(s, order)),
-        }
-    }
-
-    fn straight(length: f64) -> Self {
-        Self::smooth(length, |s, order| match order {
-            0 => [s, 0.0, 0.0],
-            1 => [1.0, 0.0, 0.0],
-            _ => [0.0; 3],
-        })
-    }
-
-    /// Around a circle.
-    fn circle(length: f64, radius: f64) -> Self {
-        Self::smooth(length, move |s, order| {
-            let scale = radius.powi(1 - order as i32);
-            let angle = s / radius + order as f64 * std::f64::consts::FRAC_PI_2;
-            [scale * angle.cos(), scale * angle.sin(), 0.0]
-        })
-    }
-
-    /// Straight, an arc, straight, an arc to the other side: the curvature jumps.
-    fn slalom(pieces: usize, length: f64, radius: f64) -> Self {
-        let mut starts: Vec<([f64; 2], f64)> = std::vec![([0.0; 2], 0.0)];
-        let bend = move |piece: usize| match piece % 4 {
-            1 => 1.0 / radius,
-            3 => -1.0 / radius,
-            _ => 0.0,
-        };
-        let along = |([x, y], angle): ([f64; 2], f64), k: f64, s: f64| {
-            let turned = angle + k * s;
-            if k == 0.0 {
-                ([x + s * angle.cos(), y + s * angle.sin()], angle)
-            } else {
-                let (dx, dy) = ((turned.sin() - angle.sin()) / k, (angle.cos() - turned.cos()) / k);
-                ([x + dx, y + dy], turned)
-            }
-        };
-        for piece in 0..pieces {
-            let next = along(starts[piece], bend(piece), length);
-            starts.push(next);
-        }
-        Self {
-            ends: (0..=pieces).map(|piece| piece as f64 * length).collect(),
-            of: Box::new(move |piece, s, order| {
-                let k = bend(piece);
-                let ([x, y], angle) = along(starts[piece], k, s - piece as f64 * length);
-                match order {
-                    0 => [x, y, 0.0],
-                    1 => [angle.cos(), angle.sin(), 0.0],
-                    2 => [-k * angle.sin(), k * angle.cos(), 0.0],
-                    _ => [-k * k * angle.cos(), -k * k * angle.sin(), 0.0],
-                }
-            }),
-        }
-    }
-
-    /// Straight, with a speed of the centre that jumps by this share of the contact's from piece to piece, as over knots where the curvature jumps.
-    fn stepped(pieces: usize, length: f64, share: f64) -> Self {
-        let slope = move |piece: usize| if piece.is_multiple_of(2) { 1.0 } else { 1.0 - share };
-        let start = move |piece: usize| (0..piece).map(|piece| slope(piece) * length).sum::<f64>();
-        Self {
-            ends: (0..=pieces).map(|piece| piece as f64 * length).collect(),
-            of: Box::new(move |piece, s, order| match order {
-                0 => [
-                    start(piece) + slope(piece) * (s - piece as f64 * length),
-                    0.0,
-                    0.0,
-                ],
-                1 => [slope(piece), 0.0, 0.0],
-                _ => [0.0; 3],
-            }),
-        }
-    }
-
-    fn length(&self) -> f64 {
-        *self.ends.last().unwrap()
-    }
-
-    fn at(&self, s: f64) -> [f64; 3] {
-        let s = s.clamp(0.0, self.length());
-        let pieces = self.ends.len() - 1;
-        let piece = self.ends[1..pieces].iter().filter(|end| **end <= s).count();
-        (self.of)(piece, s, 0)
-    }
-
-    fn plan(&self, limits: &MotionLimits) -> Box<Plan> {
-        let mut plan = Box::new(Plan::NONE);
-        plan.limits = *limits;
-        plan.stations.clear();
-        let pieces = self.ends.len() - 1;
-        let cells = (160 / pieces).min(168 / pieces - 1).max(2);
-        for piece in 0..pieces {
-            for station in 0..=cells {
-                let part = station as f64 / cells as f64;
-                let s = self.ends[piece] + part * (self.ends[piece + 1] - self.ends[piece]);
-                let station = Station {
-                    arc_nm: (s * 1e6).round() as u32,
-                    q: [0, 1, 2].map(|axis| [1, 2, 3].map(|order| (self.of)(piece, s, order)[axis] as f32)),
-                };
-                plan.stations.push(station);
-            }
-        }
-        let mut planner = Box::new(Planner::IDLE);
-        // It may be waited for.
-        let deadlines = Deadlines {
-            spent: 0,
-            least: 0,
-            left: None,
-            waits: false,
-        };
-        planner.begin(&mut plan);
-        while !planner.is_done() {
-            planner.work(&mut plan, deadlines);
-        }
-        plan
-    }
-}
 
 fn limits(feed: f32) -> MotionLimits {
     limits_of(feed, 1000.0, 20_000.0)
@@ -544,13 +412,14 @@ fn jumps_of_the_speed_are_passed_at_a_rest_or_faster() {
 /// these, so that it did not rest, and the plan took up to five times as long. So did a mean of few periods.
 #[test]
 fn walks_rest_at_jumps_whatever_their_nodes() {
-    for (pieces, length, feed, acceleration, jerk) in [
-        (4, 1.6, 10.0, 600.0, 60e3),
-        (3, 3.6, 10.0, 600.0, 60e3),
-        (5, 2.0, 20.0, 1500.0, 200e3),
-        (3, 10.4, 20.0, 1500.0, 200e3),
-        (2, 4.0, 10.0, 500.0, 100e3),
-        (2, 9.6, 10.0, 500.0, 100e3),
+    // What `verify` allows of the acceleration in the last: a period is a fifth of the time in which it is reached.
+    for (pieces, length, feed, acceleration, jerk, most_acceleration) in [
+        (4, 1.6, 10.0, 600.0, 60e3, 1.0001),
+        (3, 3.6, 10.0, 600.0, 60e3, 1.0001),
+        (5, 2.0, 20.0, 1500.0, 200e3, 1.0001),
+        (3, 10.4, 20.0, 1500.0, 200e3, 1.0001),
+        (2, 4.0, 10.0, 500.0, 100e3, 1.0001),
+        (2, 9.6, 10.0, 500.0, 100e3, 1.01),
     ] {
         let limits = limits_of(feed, acceleration, jerk);
         let path = Path::stepped(pieces, length, 0.3);
@@ -560,9 +429,8 @@ fn walks_rest_at_jumps_whatever_their_nodes() {
         let time = arcs.len() as f64 * T;
         let (most, long) = (uses(&path, &arcs, &limits), long_jerk(&path, &arcs, &limits));
         std::println!("{pieces} of {length}: {:.3} {most:.4?} {long:.4}", time / rests);
-        // What `verify` allows: a period is a fifth of the time in which the acceleration is reached.
         assert!(
-            most[0] <= 1.0001 && most[1] <= 1.01 && most[2] <= 1.02 && long <= 1.0,
+            most[0] <= 1.0001 && most[1] <= most_acceleration && most[2] <= 1.02 && long <= 1.0,
             "{most:?} {long}"
         );
         assert!(time <= 1.2 * rests, "{pieces} of {length}: {time} {rests}");
