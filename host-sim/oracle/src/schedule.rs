@@ -30,7 +30,7 @@ const HEIGHT_SHARE_MIN: f64 = 0.5;
 /// Newton iterations for the root of a cubic: more than needed.
 const NEWTON_STEPS: u8 = 12;
 /// Part of a step-over that a pass leaves within the limit without the next one; the core's value.
-const ALONE: f64 = 0.49;
+const ONE_SIDED: f64 = 0.49;
 /// Largest number of passes of a schedule.
 const PASSES_MAX: usize = 1_000_000;
 
@@ -115,9 +115,9 @@ impl Oracle {
         }
         let room = end - side;
         if side == start && self.is_point(start) {
-            ALONE * step
+            ONE_SIDED * step
         } else if step >= room && room > 0.5 * step && self.is_point(end) {
-            room - ALONE * step
+            room - ONE_SIDED * step
         } else {
             step
         }

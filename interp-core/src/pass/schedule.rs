@@ -73,11 +73,11 @@ pub(crate) fn apart(from: SpanParameter, to: SpanParameter, width: impl Fn(u16) 
 }
 
 /// Part of a step-over from a pass that its own balls leave within the scallop limit.
-const ALONE: f32 = 0.49;
+const ONE_SIDED: f32 = 0.49;
 
 /// The step from a pass that is a single point, which is cut with one normal.
 pub(crate) fn from_point(step: f32) -> f32 {
-    ALONE * step
+    ONE_SIDED * step
 }
 
 /// A step that may lead to the last boundary where that is a single point: only from a part of a step-over, so that another pass lies in between.
@@ -91,7 +91,7 @@ pub(crate) fn to_point(header: &Header, step: f32, from: SpanParameter, width: i
     };
     let room = apart(from, end, width);
     if step >= room && room > 0.5 * step {
-        room - ALONE * step
+        room - ONE_SIDED * step
     } else {
         step
     }

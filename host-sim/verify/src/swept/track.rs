@@ -142,9 +142,9 @@ struct LeftOut {
     apart_nm: f64,
 }
 
-/// How a sample lies to those stored.
+/// Where a sample is with respect to those stored.
 #[derive(Clone, Copy)]
-enum Lie {
+enum Placement {
     /// Nearer to the last one than the minimum distance, nm, in the direction in which that was reached.
     Near(f64),
     /// Farther in that direction.
@@ -182,13 +182,13 @@ impl ToolPath {
         }
     }
 
-    /// How a sample lies to those stored.
-    fn lie(&mut self, sample: &PassSample) -> Lie {
+    /// Where a sample is with respect to those stored.
+    fn placement(&self, sample: &PassSample) -> Placement {
         let Some(pass) = self.passes.last().filter(|_| !sample.first_of_pass) else {
-            return Lie::Far;
+            return Placement::Far;
         };
         let Some(last) = pass.cl_nm.len().checked_sub(1) else {
-            return Lie::Far;
+            return Placement::Far;
         };
         let stored = |index: usize| DVec3::from(pass.cl_nm[index].map(f64::from));
         let by = DVec3::from(sample.cl_nm.map(f64::from)) - stored(last);
@@ -199,11 +199,11 @@ impl ToolPath {
         });
         let is_straight = direction == DVec3::ZERO || by.distance(direction * apart) <= self.bend_nm;
         if !is_straight || !recedes {
-            Lie::Beside
+            Placement::Beside
         } else if apart < self.spacing_nm {
-            Lie::Near(apart)
+            Placement::Near(apart)
         } else {
-            Lie::Far
+            Placement::Far
         }
     }
 
@@ -231,8 +231,8 @@ impl ToolPath {
                 self.push_turn(cl_nm, boundary);
             }
         }
-        let lie = self.lie(sample);
-        if let (Lie::Near(apart_nm), false) = (lie, sample.last_of_pass) {
+        let placement = self.placement(sample);
+        if let (Placement::Near(apart_nm), false) = (placement, sample.last_of_pass) {
             self.left_out = Some(LeftOut {
                 tick: sample.tick,
                 path,
@@ -245,7 +245,7 @@ impl ToolPath {
         let left_out = self.left_out.take();
         if let Some(pass) = self.passes.last_mut() {
             // The path is straight up to the sample before.
-            if let (Lie::Beside, Some(before)) = (lie, left_out) {
+            if let (Placement::Beside, Some(before)) = (placement, left_out) {
                 pass.push(before.tick, before.path, before.side, before.cl_nm);
             }
             pass.push(sample.tick, path, side, sample.cl_nm);

@@ -126,7 +126,7 @@ impl Run {
         match &self.planning {
             PassPlanning::Fronts(fronts) => fronts.has_work() || self.is_front_due(),
             PassPlanning::Scan(scan) => {
-                spacing == Spacing::Exact && (scan.has_work() || self.is_step_due()) || self.is_pass_due()
+                spacing.is_exact() && (scan.has_work() || self.is_step_due()) || self.is_pass_due()
             }
         }
     }
@@ -149,7 +149,7 @@ impl Run {
     pub(crate) fn plan(&mut self, job: &Job<'_>, rest: &mut [i32], spent: u32) {
         let has_work = match &mut self.planning {
             PassPlanning::Fronts(fronts) => return fronts.plan(job, rest, &mut self.lines, spent),
-            PassPlanning::Scan(scan) if job.header.spacing == Spacing::Exact => {
+            PassPlanning::Scan(scan) if job.header.spacing.is_exact() => {
                 scan.plan(job);
                 scan.has_work()
             }
@@ -238,8 +238,8 @@ impl Run {
             shape,
             ..
         } = self.travel;
-        match (&mut self.planning, job.header.spacing) {
-            (PassPlanning::Scan(scan), Spacing::Exact) => scan.step(
+        match &mut self.planning {
+            PassPlanning::Scan(scan) if job.header.spacing.is_exact() => scan.step(
                 job,
                 PassMaximum {
                     inv_interval_sq: max_inv_interval_sq,
