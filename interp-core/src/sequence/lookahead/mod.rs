@@ -118,10 +118,11 @@ pub(crate) struct Lookahead {
     /// Mean length of a patch of the last pass, mm, or the greatest by the way of the centre around an edge; the greatest of those so far.
     patch_mm: f32,
     centre_mm: f32,
-    /// Whether the centre's path bent much more than the contact's on the last pass, and so far; the ball hardly fits into a half of this patch.
+    /// Whether the centre's path bent much more than the contact's on the last pass, and so far; the ball hardly fits into a half of
+    /// this patch, or goes around an edge there.
     has_bend: bool,
     bends: bool,
-    hardly_fits: bool,
+    may_turn: bool,
     /// Whether the curvature jumped at a patch boundary of the last pass, and so far.
     has_jump: bool,
     jumps: bool,
@@ -182,7 +183,7 @@ impl Lookahead {
         centre_mm: 0.0,
         has_bend: false,
         bends: false,
-        hardly_fits: false,
+        may_turn: false,
         has_jump: false,
         jumps: false,
         bend: [0.0; 3],

@@ -44,9 +44,9 @@ impl Lookahead {
         // Where it hardly fits, the centre's path bends as much.
         let hardly_fits = |length: f32, centre: f32| centre < HARDLY_FITS * length;
         self.bends |= by_centre > length || hardly_fits(length, centre);
-        self.hardly_fits = halves
-            .iter()
-            .any(|[length, centre]| hardly_fits(*length, *centre));
+        let turns =
+            |[length, centre]: &[f32; 2]| CENTRE_SHARE * centre > *length || hardly_fits(*length, *centre);
+        self.may_turn = halves.iter().any(turns);
         let length = length.at_least(by_centre);
         if out.cells == 0 {
             let [start, end] = out.route.ends;
@@ -177,7 +177,7 @@ impl Lookahead {
             self.keep_derivatives(station, usize::from(at), out);
         } else if rest == 0 {
             let q = self.window.derivatives(usize::from(at));
-            if self.hardly_fits {
+            if self.may_turn {
                 self.note_turn(&q);
             }
             let back = self.station / looks - kept + 1;
