@@ -45,6 +45,9 @@ const MARGIN: f32 = 0.003;
 const MARGIN_AT_KNOT: f32 = 0.005;
 /// The whole of it where the inverse square interval changes by 5 %; on a plane there is none.
 const VARIES: f32 = 20.0;
+/// Margin in height at the distance on any surface: a share of how the inverse square interval varies, and its greatest.
+const MARGIN_OF_VARIATION: f32 = 0.02;
+const MARGIN_LEAST: f32 = 5e-5;
 /// Greatest margin in the step.
 const MARGIN_MAX: f32 = 0.05;
 
@@ -72,10 +75,12 @@ impl EdgeCrest {
         let (rise, change) = (self.mean / here - 1.0, self.beyond / here - 1.0);
         let of_change = MARGIN_OF_CHANGE * (0.5 * change - rise).abs() + MARGIN_OF_RISE * rise * rise;
         let of_knot = if jumps { MARGIN_OF_KNOT } else { 0.0 };
-        let varies = (VARIES * (rise.abs() + change.abs())).at_most(1.0);
+        let variation = rise.abs() + change.abs();
+        let varies = (VARIES * variation).at_most(1.0);
+        let always = (MARGIN_OF_VARIATION * variation).at_most(MARGIN_LEAST);
         let at_knot = if jumps { MARGIN_AT_KNOT * varies } else { 0.0 };
         let off = (1.0 - step / self.distance).abs().at_most(1.0);
-        let margin = off * (of_change + of_knot + MARGIN) + at_knot;
+        let margin = off * (of_change + of_knot + MARGIN) + at_knot + always;
         // A NaN: no margin.
         step * (1.0 - (0.5 * margin).at_least(0.0).at_most(MARGIN_MAX))
     }
