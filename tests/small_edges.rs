@@ -82,6 +82,18 @@ fn fillet(radius: f64, angle: f64, handles: &[f64]) -> Profile {
     Profile { knots, poles }
 }
 
+/// The same behind this many straight pieces of a length.
+fn behind_flats(flats: usize, length: f64, fillet: &Profile) -> Profile {
+    let mut poles: Vec<_> = (0..3 * flats)
+        .map(|k| [(k as f64 / 3.0 - flats as f64) * length, 0.0])
+        .collect();
+    poles.extend(&fillet.poles);
+    let mut knots = vec![0.0];
+    knots.extend((0..flats).flat_map(|k| [k as f64; 3]));
+    knots.extend(fillet.knots[1..].iter().map(|knot| knot + flats as f64));
+    Profile { knots, poles }
+}
+
 /// A surface of this profile, 1.5 mm wide, within the limits of the machine.
 fn job(profile: &Profile) -> Job {
     let mut text = format!(
@@ -128,6 +140,26 @@ fn passes_around_small_edges() {
         }
     }
     assert!(off.is_empty(), "{off}");
+}
+
+/// Where a pass has so many patches that two cells are kept of each, a bend of patches of 0.3 mm is looked at in four all the same: by two, of one second
+/// derivative, it used 2.5 of the jerk limit on a face of a part.
+#[test]
+fn limits_hold_in_a_bend_of_many_patches() {
+    for (radius, handles) in [
+        (2.7, &[1.0, 0.9, 1.1, 0.95, 1.05, 1.1, 0.92, 1.0][..]),
+        (2.2, &[0.9, 1.1, 0.9, 1.1, 0.9, 1.1, 0.9, 1.1]),
+        (1.5, &[1.0, 1.1, 1.0, 0.9, 1.0, 1.1, 0.9, 1.0]),
+    ] {
+        let bend = fillet(radius, 0.3 * handles.len() as f64 / radius, handles);
+        let Used { shares, stand, .. } = used(&job(&behind_flats(38, 0.5, &bend)));
+        println!("{radius} mm: {shares:.3?} of the limits, stands for {stand} periods");
+        let [velocity, acceleration, jerk] = shares;
+        assert!(
+            velocity <= 1.001 && acceleration <= 1.0 && jerk <= 1.02,
+            "{radius}: {shares:?}"
+        );
+    }
 }
 
 /// Curvatures that jump so much that the tool has to rest: the offline solver finds no motion, the limits hold.

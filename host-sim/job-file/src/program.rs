@@ -65,6 +65,9 @@ pub(super) fn read(path: &Path) -> Result<String, JobError> {
         )),
         (Some(table), None) => {
             let numbers = numbers(&name, &table)?;
+            if let [only] = numbers[..] {
+                return one(&name, table, only);
+            }
             let first = numbers.first().copied().unwrap_or(1);
             Err(JobError::of_file(
                 &name,
@@ -180,6 +183,17 @@ mod tests {
         assert!(!job.contains_key("face"));
         // One that is named is taken as it is.
         assert_eq!(jobs_of(&jobs[0]).unwrap(), [jobs[0].clone()]);
+    }
+
+    /// A job of one face is read without its number.
+    #[test]
+    fn the_only_face_needs_no_number() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("part.toml");
+        let (head, _) = PART.rsplit_once("[[face]]").unwrap();
+        std::fs::write(&file, head).unwrap();
+        let job: Table = read(&file).unwrap().parse().unwrap();
+        assert_eq!(job["surface"]["face"].as_integer(), Some(7));
     }
 
     #[test]

@@ -1,8 +1,9 @@
 //! Stations of a piece: which of them are looked at and kept, their checks, arcs and derivatives.
 
+use super::stretch::HALVED_MIN_MM;
 use super::{CELL_KEPT_MM, Lookahead, PATCHES, PassPlan, Task, check_crease, check_travel, stations_of};
 use crate::fault::{Fault, FaultKind, Result};
-use crate::feed::stations::{CELLS_MANY, Derivatives, Station, WINDOW, Window, parts_of_cell};
+use crate::feed::stations::{CELLS_FINE, CELLS_MANY, Derivatives, Station, WINDOW, Window, parts_of_cell};
 use crate::job::program::Job;
 use crate::job::{AxisLimits, SurfaceKind};
 use crate::math::arith::{fraction_to_f32, sqrt, truncated};
@@ -90,6 +91,11 @@ impl Lookahead {
             out.group = spans.div_ceil(PATCHES);
         }
         self.looks = parts_of_cell(length, out.cells);
+        if self.may_turn {
+            // Two cells have one second derivative and no third, by which a coarse look is known.
+            let least = CELLS_FINE.min(whole(length / HALVED_MIN_MM).max(1));
+            self.looks = self.looks.max(least.div_ceil(out.cells.max(1)));
+        }
         out.plan.stations.note_cells(out.cells, out.group);
         self.begun = out.plan.stations.count();
         self.divide_patch(out);

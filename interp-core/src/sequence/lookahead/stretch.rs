@@ -31,7 +31,7 @@ const HALVINGS_MAX: u8 = 2;
 /// The same on a patch of a straight pass into which the ball hardly fits: all of it is looked at again; shorter cells are not halved, mm.
 const CHANGE_STRAIGHT: f32 = 0.04;
 const HALVINGS_STRAIGHT: u8 = 4;
-const HALVED_MIN_MM: f32 = 0.03;
+pub(super) const HALVED_MIN_MM: f32 = 0.03;
 /// Share of the jerk limit that the error of a third derivative takes at the feed up to which a cell is not longer, and steps to longer ones.
 const NOISE_SHARE: f32 = 0.05;
 const CELL_STEP: f32 = 1.2;
