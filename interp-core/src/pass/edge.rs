@@ -47,7 +47,7 @@ const MARGIN_AT_KNOT: f32 = 0.005;
 const VARIES: f32 = 20.0;
 /// Margin in height at the distance on any surface: a share of how the inverse square interval varies, and its greatest.
 const MARGIN_OF_VARIATION: f32 = 0.02;
-const MARGIN_LEAST: f32 = 5e-5;
+const MARGIN_OF_VARIATION_MAX: f32 = 5e-5;
 /// Greatest margin in the step.
 const MARGIN_MAX: f32 = 0.05;
 
@@ -77,7 +77,7 @@ impl EdgeCrest {
         let of_knot = if jumps { MARGIN_OF_KNOT } else { 0.0 };
         let variation = rise.abs() + change.abs();
         let varies = (VARIES * variation).at_most(1.0);
-        let always = (MARGIN_OF_VARIATION * variation).at_most(MARGIN_LEAST);
+        let always = (MARGIN_OF_VARIATION * variation).at_most(MARGIN_OF_VARIATION_MAX);
         let at_knot = if jumps { MARGIN_AT_KNOT * varies } else { 0.0 };
         let off = (1.0 - step / self.distance).abs().at_most(1.0);
         let margin = off * (of_change + of_knot + MARGIN) + at_knot + always;

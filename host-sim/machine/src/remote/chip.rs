@@ -32,7 +32,7 @@ pub enum ChipError {
 pub struct Said {
     /// What a correct program does not do.
     pub complaints: Vec<String>,
-    /// Bytes from the host that were lost in USART1.
+    /// Bytes from the host that were lost in USART1, apart from those that came while a word was written to flash.
     pub bytes_lost: u64,
     /// The longest time from a byte's arrival to its being read, cycles of the core.
     pub byte_wait_max_cycles: u64,

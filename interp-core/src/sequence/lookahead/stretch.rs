@@ -28,7 +28,7 @@ const THIRD_NOISE: f32 = 60e-6;
 const TURN_OF_CELL: f32 = 0.12;
 const CHANGE_OF_CELL: f32 = 0.008;
 const HALVINGS_MAX: u8 = 2;
-/// The same on a patch of a straight pass into which the ball hardly fits: all of it is looked at again; shorter cells are not halved, mm.
+/// The same on a patch of a straight pass into which the ball hardly fits, or where it goes around an edge: all of it is looked at again; shorter cells are not halved, mm.
 const CHANGE_STRAIGHT: f32 = 0.04;
 const HALVINGS_STRAIGHT: u8 = 4;
 pub(super) const HALVED_MIN_MM: f32 = 0.03;
