@@ -8,8 +8,11 @@ use super::surface::Surface;
 
 /// Seeds per side of each patch in the search of the nearest point on a B-spline surface.
 const SEEDS: usize = 3;
-/// Largest number of seeds per side of the whole surface; with many patches, several share a seed.
-const SEEDS_MAX: usize = 96;
+/// Largest number of seeds of the whole surface; with many patches, several share a seed.
+const SEEDS_MAX: usize = 96 * 96;
+/// Seeds, each nearer than those beside it, from which a point is sought until one leads to it: between the turns of a thread the nearest seed may be
+/// on the wrong one.
+const TRIED: usize = 8;
 /// A point found from a guess is this close to the surface, mm; otherwise the whole surface is searched.
 const FOUND_MM: f64 = 1e-4;
 /// Edges of files lie this far off their surface, mm: a nearest place within it is the one that was meant.
@@ -26,16 +29,13 @@ impl Surface {
     /// surface the result is the one nearest to the guess.
     #[must_use]
     pub fn invert(&self, to: DVec3, near: Option<[f64; 2]>) -> ([f64; 2], f64) {
-        let mut start = match near {
-            Some(near) if !self.closed_form() => near,
-            _ => self.seed(to),
+        let mut found = match near {
+            Some(near) if !self.closed_form() => self.refined(near, to),
+            _ => self.sought(to),
         };
-        let mut found = self.refined(start, to);
-        let within = if found.is_nearest { MEANT_MM } else { FOUND_MM };
-        if near.is_some() && !self.closed_form() && found.off_mm > within {
+        if near.is_some() && !self.closed_form() && !found.is_meant() {
             // Points on the surface are found from the guess; if that fails, the whole surface is searched.
-            start = self.seed(to);
-            let afresh = self.refined(start, to);
+            let afresh = self.sought(to);
             if afresh.off_mm < 0.5 * found.off_mm {
                 found = afresh;
             }
@@ -55,10 +55,31 @@ impl Surface {
         !matches!(self, Self::Spline(_) | Self::Ruled { .. } | Self::Offset { .. })
     }
 
-    /// Initial parameters of a point: exact for elementary surfaces, the best of a grid of seeds for others.
-    fn seed(&self, to: DVec3) -> [f64; 2] {
+    /// The place nearest to a point, sought on the whole surface.
+    fn sought(&self, to: DVec3) -> Found {
+        if let Some(seed) = self.seed(to) {
+            return self.refined(seed, to);
+        }
+        let [first, others @ ..] = &self.seeds(to)[..] else {
+            unreachable!("a grid has a nearest seed")
+        };
+        let mut best = self.refined(*first, to);
+        for seed in others {
+            if best.is_meant() {
+                break;
+            }
+            let found = self.refined(*seed, to);
+            if found.off_mm < best.off_mm {
+                best = found;
+            }
+        }
+        best
+    }
+
+    /// Parameters of a point of an elementary surface, a revolution or an extrusion; `None` for other surfaces, which have [`Self::seeds`].
+    fn seed(&self, to: DVec3) -> Option<[f64; 2]> {
         let share = |from: DVec3, x: DVec3| from.dot(x) / x.length_squared();
-        match self {
+        let place = match self {
             Self::Plane { origin, x, y } => {
                 let from = to - *origin;
                 [share(from, *x), share(from, *y)]
@@ -127,47 +148,50 @@ impl Surface {
                 };
                 [u, share(to - profile.at(u)[0], *direction)]
             }
-            _ => self.best_of_grid(to),
-        }
+            Self::Spline(_) | Self::Ruled { .. } | Self::Offset { .. } => return None,
+        };
+        Some(place)
     }
 
-    /// The nearest of a grid of points.
-    fn best_of_grid(&self, to: DVec3) -> [f64; 2] {
-        let places = |k: usize| -> Vec<f64> {
+    /// Places of a grid that are nearer to a point than those beside them, the nearest first: at least one, at most [`TRIED`].
+    fn seeds(&self, to: DVec3) -> Vec<[f64; 2]> {
+        let breaks = [0, 1].map(|k| {
             let range = self.domain()[k].unwrap_or([0.0, 1.0]);
-            let breaks = match self {
+            match self {
                 Self::Spline(spline) => spline.axes[k].breaks(),
                 _ => (0..=8)
                     .map(|i| range[0] + (range[1] - range[0]) * f64::from(i) / 8.0)
                     .collect(),
-            };
-            let wanted = (SEEDS * (breaks.len() - 1)).min(SEEDS_MAX);
-            let spans = breaks.len() - 1;
-            // Centres of cells: at a degenerate point the gradient vanishes.
-            (0..wanted)
-                .map(|i| {
-                    let place = (i as f64 + 0.5) * spans as f64 / wanted as f64;
-                    #[allow(
-                        clippy::cast_possible_truncation,
-                        clippy::cast_sign_loss,
-                        reason = "a small index"
-                    )]
-                    let span = (place as usize).min(spans - 1);
-                    breaks[span] + (breaks[span + 1] - breaks[span]) * (place - span as f64)
-                })
-                .collect()
-        };
-        let (us, vs) = (places(0), places(1));
-        let mut best = (f64::INFINITY, [us[0], vs[0]]);
-        for &u in &us {
-            for &v in &vs {
-                let distance = self.at(u, v).point.distance_squared(to);
-                if distance < best.0 {
-                    best = (distance, [u, v]);
+            }
+        });
+        let [us, vs] = grid(&breaks);
+        let distance: Vec<Vec<f64>> = us
+            .iter()
+            .map(|u| {
+                vs.iter()
+                    .map(|v| self.at(*u, *v).point.distance_squared(to))
+                    .collect()
+            })
+            .collect();
+        let mut least: Vec<(f64, [f64; 2])> = Vec::new();
+        for (i, u) in us.iter().enumerate() {
+            for (j, v) in vs.iter().enumerate() {
+                let here = distance[i][j];
+                let beside = distance[i.saturating_sub(1)..us.len().min(i + 2)]
+                    .iter()
+                    .flat_map(|row| &row[j.saturating_sub(1)..vs.len().min(j + 2)]);
+                if beside.copied().all(|other| here <= other) {
+                    least.push((here, [*u, *v]));
                 }
             }
         }
-        best.1
+        least.sort_by(|a, b| a.0.total_cmp(&b.0));
+        least.truncate(TRIED);
+        if least.is_empty() {
+            // Not a number somewhere: no place is nearest.
+            least.push((f64::NAN, [us[0], vs[0]]));
+        }
+        least.into_iter().map(|(_, place)| place).collect()
     }
 
     /// Newton's method on the distance, within the domain; no step increases the distance.
@@ -230,6 +254,36 @@ impl Surface {
     }
 }
 
+/// Parameters of a grid of at most [`SEEDS_MAX`] places between these breaks.
+fn grid(breaks: &[Vec<f64>; 2]) -> [Vec<f64>; 2] {
+    let wanted = breaks.each_ref().map(|breaks| SEEDS * (breaks.len() - 1));
+    let share = (SEEDS_MAX as f64 / (wanted[0] * wanted[1]) as f64)
+        .sqrt()
+        .min(1.0);
+    std::array::from_fn(|k| {
+        let spans = breaks[k].len() - 1;
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "at most the number wanted, above 0"
+        )]
+        let wanted = ((share * wanted[k] as f64) as usize).max(SEEDS);
+        // Centres of cells: at a degenerate point the gradient vanishes.
+        (0..wanted)
+            .map(|i| {
+                let place = (i as f64 + 0.5) * spans as f64 / wanted as f64;
+                #[allow(
+                    clippy::cast_possible_truncation,
+                    clippy::cast_sign_loss,
+                    reason = "a small index"
+                )]
+                let span = (place as usize).min(spans - 1);
+                breaks[k][span] + (breaks[k][span + 1] - breaks[k][span]) * (place - span as f64)
+            })
+            .collect()
+    })
+}
+
 /// A place by Newton's method.
 struct Found {
     place: [f64; 2],
@@ -237,6 +291,13 @@ struct Found {
     off_mm: f64,
     /// No place beside it is nearer.
     is_nearest: bool,
+}
+
+impl Found {
+    /// Whether it is a place that the point was meant to have.
+    fn is_meant(&self) -> bool {
+        self.off_mm <= if self.is_nearest { MEANT_MM } else { FOUND_MM }
+    }
 }
 
 /// Solution of a symmetric system of two equations `h x = -slope`, if it is positive definite.

@@ -1,5 +1,7 @@
 //! Surfaces of every kind: the exact form as a B-spline, placement, least concave radii.
 
+use std::f64::consts::PI;
+
 use super::*;
 use crate::exact::exact;
 
@@ -113,6 +115,41 @@ fn concave_radii_are_measured() {
                 }
                 other => panic!("{}, side {side}: {other:?}", surface.kind()),
             }
+        }
+    }
+}
+
+/// A place on the flank of a thread is found without a guess, though other turns are next to it: 25 turns, 200 spans of a quadratic along the helix.
+#[test]
+fn places_on_a_thread_are_found() {
+    let (spans, pitch) = (200, 1.0);
+    let inner = (1..spans).map(f64::from);
+    let knots: Vec<f64> = [0.0; 3]
+        .into_iter()
+        .chain(inner)
+        .chain([f64::from(spans); 3])
+        .collect();
+    let helix = |pole: i32, radius: f64, z: f64| {
+        let angle = 0.25 * PI * (f64::from(pole) - 0.5);
+        let z = z + pitch * angle / TAU;
+        [radius * angle.cos(), radius * angle.sin(), z, 1.0]
+    };
+    let poles = [(2.5, 0.0), (3.0, 0.4)]
+        .map(|(radius, z)| (0..spans + 2).map(|pole| helix(pole, radius, z)).collect())
+        .into();
+    let flank = Axis {
+        degree: 1,
+        knots: vec![0.0, 0.0, 1.0, 1.0],
+    };
+    let axes = [flank, Axis { degree: 2, knots }];
+    let thread = Surface::Spline(SplineSurface { poles, axes });
+    for i in 0..=10 {
+        for j in 0..=997 {
+            let (u, v) = (f64::from(i) / 10.0, f64::from(spans * j) / 997.0);
+            let point = thread.at(u, v).point;
+            let ([found_u, found_v], off_mm) = thread.invert(point, None);
+            assert!(off_mm < 1e-6, "{off_mm} mm off at {u}, {v}");
+            near(thread.at(found_u, found_v).point, point, 1e-6, "the place found");
         }
     }
 }
