@@ -161,13 +161,17 @@ pub(super) fn print(
             found.cells
         ),
         Some(gouge) => say!(
-            "  FAIL {:<22} {:.4} um at u = {:.6}, v = {:.6}, by tick {}, pass {}",
+            "  {} {:<22} {:.4} um at u = {:.6}, v = {:.6}, by tick {}, pass {}{}",
+            mark(found.gouge_verdict),
             "gouge",
             um(gouge.depth_mm),
             gouge.u,
             gouge.v,
             gouge.tick,
-            gouge.pass
+            gouge.pass,
+            job.origin.part().map_or_else(String::new, |part| {
+                format!(" (at most {}: the part's tolerance)", um(part.tolerance_mm))
+            })
         ),
     }
     if let Some(original) = &found.original {

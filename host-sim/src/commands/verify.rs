@@ -155,7 +155,7 @@ fn marks(job: &Job, timed: &TimedRun, measured: &RunMeasurements) -> Vec<Mark> {
         });
     }
     let swept = &measured.swept;
-    if let Some(gouge) = &swept.gouge {
+    if let Some(gouge) = swept.violating_gouge() {
         marks.push(Mark {
             what: format!("gouge {:.4} mm", gouge.depth_mm),
             place_mm: gouge.point_mm,

@@ -119,7 +119,7 @@ pub struct SweptResult {
     /// Verdict on the highest ridge. [`Verdict::Unknown`]: the error bound is above [`super::ERROR_SHARE_MAX`] of the limit, or there are
     /// fewer than two whole passes.
     pub scallop_verdict: Verdict,
-    /// Verdict on gouges. [`Verdict::Unknown`]: the bound of the search is above [`super::ERROR_SHARE_MAX`] of the scallop limit.
+    /// Verdict on gouges: deeper than the tolerance of the part whose face this is, or any where there is none. [`Verdict::Unknown`]: the bound of the search is above [`super::ERROR_SHARE_MAX`] of the scallop limit.
     pub gouge_verdict: Verdict,
     /// Mean of the crest's height, weighted by the surface's area (each gap's strip counts with its crest's height), mm.
     pub scallop_mean_mm: f64,
@@ -225,6 +225,14 @@ impl SweptResult {
         self.gouge.map_or(0.0, |gouge| gouge.depth_mm)
     }
 
+    /// The deepest gouge, where it is deeper than allowed.
+    #[must_use]
+    pub fn violating_gouge(&self) -> Option<&Gouge> {
+        self.gouge
+            .as_ref()
+            .filter(|_| self.gouge_verdict == Verdict::Violated)
+    }
+
     /// Whether the material at the highest ridge is out of every ball's reach.
     fn uncut(&self, job: &Job) -> bool {
         self.scallop_max.height_mm >= MISSED_RADII * job.radius_mm
@@ -245,7 +253,7 @@ impl SweptResult {
     }
 
     fn judge_gouge(&self, job: &Job) -> Verdict {
-        if self.gouge.is_some() {
+        if self.gouge_max_mm() > gouge_allowed_mm(job) {
             Verdict::Violated
         } else if self.gouge_bound_mm.max(self.gouge_floor_mm) <= self.gouge_seen_mm(job) {
             Verdict::Met
@@ -256,7 +264,9 @@ impl SweptResult {
 
     /// Depth above which every gouge must be seen, mm.
     fn gouge_seen_mm(&self, job: &Job) -> f64 {
-        (super::ERROR_SHARE_MAX * job.scallop_mm).max(GOUGE_SEEN_MM)
+        (super::ERROR_SHARE_MAX * job.scallop_mm)
+            .max(GOUGE_SEEN_MM)
+            .max(gouge_allowed_mm(job))
     }
 
     /// Whether the job's region holds no two neighbouring passes.
@@ -324,7 +334,7 @@ impl SweptResult {
                 self.gouge_seen_mm(job)
             ));
         }
-        if let Some(gouge) = &self.gouge {
+        if let Some(gouge) = self.violating_gouge() {
             let what = if gouge.local {
                 "the ball's radius exceeds the concave radius there"
             } else {
@@ -465,6 +475,11 @@ fn mean(oracle: &Oracle, parts: &Measurements<'_>) -> (f64, [f64; BINS]) {
         return (0.0, histogram);
     }
     (sum / area, histogram.map(|part| part / area))
+}
+
+/// How deep the ball may enter the surface, mm: as deep as the tool may enter the part whose face it is.
+fn gouge_allowed_mm(job: &Job) -> f64 {
+    job.origin.part().map_or(0.0, |part| part.tolerance_mm)
 }
 
 fn gouge(oracle: &Oracle, track: &ToolPath, search: &GougeSearchResult) -> Option<Gouge> {

@@ -9,6 +9,8 @@ use oracle::PassSample;
 
 use crate::Verdict;
 
+mod gouges;
+
 const RADIUS: f64 = 5.0;
 
 fn job(surface: SurfaceSpec, along: Along, side: Side, scallop_mm: f64) -> Job {
@@ -180,7 +182,7 @@ fn cylinder_around_its_axis() {
 /// The sample job's cap of 25 mm: meridians from its pole down to 60 degrees.
 #[test]
 fn sphere_by_meridians() {
-    let text = include_str!("../../../../jobs/sphere_cap.toml");
+    let text = include_str!("../../../../../jobs/sphere_cap.toml");
     let job = job_file::parse("sphere_cap", text).unwrap();
     let oracle = Oracle::new(&job).unwrap();
     let sides: Vec<f64> = (0..=60).map(|k| f64::from(k) / 60.0).collect();
@@ -213,7 +215,7 @@ fn sphere_by_meridians() {
 /// The same cap by circles around its pole, the first of which is the pole itself. Between circles the crest is half-way.
 #[test]
 fn sphere_by_circles_around_its_pole() {
-    let text = include_str!("../../../../jobs/sphere_cap.toml");
+    let text = include_str!("../../../../../jobs/sphere_cap.toml");
     for (sides, steps, coarse) in [
         (&[0.0, 0.04, 0.09, 0.13][..], 400, false),
         (&[0.0, 0.04, 0.09, 0.13], 24, false),
@@ -321,67 +323,6 @@ fn extruded(degree: usize, profile: &[[f64; 2]]) -> SurfaceSpec {
     })
 }
 
-/// Flanks at 45 degrees, 28.28 mm long: a ball on one flank, at s from the bottom, enters the other one by r - s.
-#[test]
-fn ball_on_one_flank_gouges_the_other() {
-    let valley = extruded(1, &[[-20.0, 20.0], [0.0, 0.0], [20.0, 20.0]]);
-    let job = job(valley, Along::V, Side::Up, 0.01);
-    let flank = 800.0_f64.sqrt();
-    // Passes at 8, 6, 1.3 mm from the bottom, and at 2, 7 on the other side.
-    let sides = [-8.0, -6.0, -1.3, 2.0, 7.0].map(|s| 0.5 + 0.5 * s / flank);
-    let oracle = Oracle::new(&job).unwrap();
-    let found = measure(
-        &job,
-        &oracle,
-        &track(&oracle, &sides, 800),
-        true,
-        &Requirements::default(),
-        &(),
-    );
-    let gouge = found.gouge.unwrap();
-    let exact = RADIUS - 1.3;
-    assert!((gouge.depth_mm / exact - 1.0).abs() < 1e-3, "{gouge:?}");
-    // Under the centre, at r along the other flank.
-    let foot = RADIUS * FRAC_1_SQRT_2;
-    assert!(
-        gouge.point_mm.distance(DVec3::new(foot, gouge.point_mm.y, foot)) < 0.3,
-        "{gouge:?}"
-    );
-    assert_eq!((gouge.pass, gouge.local), (2, false));
-    let samples = &oracle_sample(&found, &oracle, &sides);
-    assert!(samples.distance(gouge.point_mm) < RADIUS);
-    assert_eq!(
-        found.failures.iter().filter(|line| line.contains("cuts")).count(),
-        1
-    );
-}
-
-/// The ball's centre at the gouging tick, recomputed.
-fn oracle_sample(found: &SweptResult, oracle: &Oracle, sides: &[f64]) -> DVec3 {
-    let track = track(oracle, sides, 800);
-    let tick = found.gouge.unwrap().tick;
-    let pass = track.passes.iter().rfind(|pass| pass.first_tick <= tick).unwrap();
-    pass.centre((tick - pass.first_tick) as usize)
-}
-
-/// A concave cylinder of smaller radius than the ball: from every contact the ball interferes most with the far edge.
-#[test]
-fn ball_in_a_small_concave_radius_is_a_local_gouge() {
-    let job = job(cylinder(4.0), Along::U, Side::Plus, 0.01);
-    let found = measured(&job, &[0.0, 0.2, 0.4, 0.6, 0.8, 1.0], 300);
-    let gouge = found.gouge.unwrap();
-    // Seen from the axis, the centre is 1 mm opposite to the contact; the other edge is 1 rad away.
-    let distance = (16.0 + 1.0 + 8.0 * 1.0_f64.cos()).sqrt();
-    assert!(
-        (gouge.depth_mm / (RADIUS - distance) - 1.0).abs() < 2e-3,
-        "{gouge:?}"
-    );
-    assert!(gouge.local && (gouge.v < 0.02 || gouge.v > 0.98));
-    let concave = found.shape.concave_radius.unwrap();
-    assert!((concave.radius_mm - 4.0).abs() < 1e-9);
-    assert!(found.warnings.iter().any(|line| line.contains("does not fit")));
-}
-
 /// A groove 0.8 mm wide between two passes 2 mm apart: no sample is in it, and the ball bridges it.
 #[test]
 fn groove_between_passes_stays_uncut() {
@@ -480,7 +421,7 @@ fn travel_is_compared_with_the_machine() {
 
 #[test]
 fn results_do_not_depend_on_threads() {
-    let text = include_str!("../../../../jobs/torus.toml");
+    let text = include_str!("../../../../../jobs/torus.toml");
     let job = job_file::parse("torus", text).unwrap();
     let oracle = Oracle::new(&job).unwrap();
     let sides: Vec<f64> = (0..=12).map(|k| f64::from(k) / 12.0).collect();

@@ -1,0 +1,102 @@
+//! Gouges against closed forms.
+
+use job::PartSource;
+
+use super::*;
+
+/// Flanks at 45 degrees, 28.28 mm long: a ball on one flank, at s from the bottom, enters the other one by r - s.
+#[test]
+fn ball_on_one_flank_gouges_the_other() {
+    let valley = extruded(1, &[[-20.0, 20.0], [0.0, 0.0], [20.0, 20.0]]);
+    let job = job(valley, Along::V, Side::Up, 0.01);
+    let flank = 800.0_f64.sqrt();
+    // Passes at 8, 6, 1.3 mm from the bottom, and at 2, 7 on the other side.
+    let sides = [-8.0, -6.0, -1.3, 2.0, 7.0].map(|s| 0.5 + 0.5 * s / flank);
+    let oracle = Oracle::new(&job).unwrap();
+    let found = measure(
+        &job,
+        &oracle,
+        &track(&oracle, &sides, 800),
+        true,
+        &Requirements::default(),
+        &(),
+    );
+    let gouge = found.gouge.unwrap();
+    let exact = RADIUS - 1.3;
+    assert!((gouge.depth_mm / exact - 1.0).abs() < 1e-3, "{gouge:?}");
+    // Under the centre, at r along the other flank.
+    let foot = RADIUS * FRAC_1_SQRT_2;
+    assert!(
+        gouge.point_mm.distance(DVec3::new(foot, gouge.point_mm.y, foot)) < 0.3,
+        "{gouge:?}"
+    );
+    assert_eq!((gouge.pass, gouge.local), (2, false));
+    let samples = &oracle_sample(&found, &oracle, &sides);
+    assert!(samples.distance(gouge.point_mm) < RADIUS);
+    assert_eq!(
+        found.failures.iter().filter(|line| line.contains("cuts")).count(),
+        1
+    );
+}
+
+/// The ball's centre at the gouging tick, recomputed.
+fn oracle_sample(found: &SweptResult, oracle: &Oracle, sides: &[f64]) -> DVec3 {
+    let track = track(oracle, sides, 800);
+    let tick = found.gouge.unwrap().tick;
+    let pass = track.passes.iter().rfind(|pass| pass.first_tick <= tick).unwrap();
+    pass.centre((tick - pass.first_tick) as usize)
+}
+
+/// A concave cylinder of smaller radius than the ball: from every contact the ball interferes most with the far edge.
+#[test]
+fn ball_in_a_small_concave_radius_is_a_local_gouge() {
+    let job = job(cylinder(4.0), Along::U, Side::Plus, 0.01);
+    let found = measured(&job, &[0.0, 0.2, 0.4, 0.6, 0.8, 1.0], 300);
+    let gouge = found.gouge.unwrap();
+    // Seen from the axis, the centre is 1 mm opposite to the contact; the other edge is 1 rad away.
+    let distance = (16.0 + 1.0 + 8.0 * 1.0_f64.cos()).sqrt();
+    assert!(
+        (gouge.depth_mm / (RADIUS - distance) - 1.0).abs() < 2e-3,
+        "{gouge:?}"
+    );
+    assert!(gouge.local && (gouge.v < 0.02 || gouge.v > 0.98));
+    let concave = found.shape.concave_radius.unwrap();
+    assert!((concave.radius_mm - 4.0).abs() < 1e-9);
+    assert!(found.warnings.iter().any(|line| line.contains("does not fit")));
+}
+
+/// On a face of a part the ball may be as deep as the part's tolerance says; deeper is a gouge, and so is any depth without a part.
+#[test]
+fn gouge_of_a_part_is_held_to_its_tolerance() {
+    let mut job = job(cylinder(4.0), Along::U, Side::Plus, 0.01);
+    // The arc is 2 um deep for a ball that is too large for it by 1 mm.
+    let half = 0.02_f64;
+    let SurfaceSpec::Revolved { v_rad, .. } = &mut job.surface else {
+        unreachable!()
+    };
+    *v_rad = [0.0, half];
+    let distance = (16.0 + 1.0 + 8.0 * half.cos()).sqrt();
+    let exact = RADIUS - distance;
+    assert!(exact > 1e-4 && exact < 2e-3, "{exact}");
+    let part = |tolerance_mm| PartSource {
+        path: "part.step".into(),
+        tolerance_mm,
+        steepest_deg: 85.0,
+    };
+    for (part, verdict) in [
+        (None, Verdict::Violated),
+        (Some(part(0.9 * exact)), Verdict::Violated),
+        (Some(part(1.1 * exact)), Verdict::Met),
+    ] {
+        job.origin.set_part(part);
+        let found = measured(&job, &[0.0, 0.25 * half, 0.5 * half, half], 300);
+        assert!(
+            (found.gouge_max_mm() / exact - 1.0).abs() < 2e-3,
+            "{:?}",
+            found.gouge
+        );
+        assert_eq!(found.gouge_verdict, verdict);
+        let cuts = found.failures.iter().filter(|line| line.contains("cuts")).count();
+        assert_eq!(cuts, usize::from(verdict == Verdict::Violated));
+    }
+}
