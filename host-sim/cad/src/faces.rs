@@ -67,10 +67,11 @@ impl Original {
         }))
     }
 
-    /// Vector from a point of the job's surface before its placement to the face's point at the same parameters, times the placement's scale.
+    /// Vector from a point of the job's surface before its placement to the face's point at the same parameters, which may lie beyond its seam, times the
+    /// placement's scale.
     #[must_use]
     pub fn from_surface(&self, u: f64, v: f64, point: DVec3) -> DVec3 {
-        (self.surface.at(u, v).point - point) * self.scale
+        (self.surface.at_periodic(u, v).point - point) * self.scale
     }
 }
 

@@ -16,6 +16,11 @@ const PLACES: usize = 6;
 const DENSE: usize = 9;
 /// Share of the tolerance for each direction; reduced if both together exceed the tolerance.
 const SHARE: f64 = 0.9;
+/// Greatest jump of a first derivative, as a share of it, and of a second one over the range, as a share of the first, that is rounding.
+const FIRST_JUMP: f64 = 1e-7;
+const SECOND_JUMP: f64 = 1e-6;
+/// Distance from a joint, as a share of the range, at which the derivatives of its sides are taken.
+const BESIDE: f64 = 1e-9;
 /// Largest number of reductions.
 const ROUNDS: usize = 8;
 /// `|S_u x S_v|` below this share of `|S_u| |S_v|`, as at a pole, leaves no normal to compare.
@@ -133,6 +138,57 @@ fn knots(breaks: &[(f64, usize)]) -> Axis {
     Axis { degree: 3, knots }
 }
 
+/// Joints inside the range of a direction with the order of continuity that the surface has there. It may be higher than the knots allow: a circle of
+/// four arcs has double knots of degree 2, at which only its second derivative jumps.
+fn measured_joints(surface: &Surface, k: usize, ranges: [[f64; 2]; 2]) -> Vec<(f64, usize)> {
+    let mut all = joints(surface, k, ranges[k]);
+    for (t, order) in &mut all {
+        *order = (*order).max(continuity(surface, k, ranges, *t));
+    }
+    all
+}
+
+/// Order of continuity at a joint, 2 at most, from the derivatives on both sides of it on lines across.
+fn continuity(surface: &Surface, k: usize, ranges: [[f64; 2]; 2], joint: f64) -> usize {
+    let whole = Periodic::new(surface);
+    let width = ranges[k][1] - ranges[k][0];
+    let derivatives = |t: f64, line: f64| {
+        let at = if k == 0 {
+            whole.at(t, line)
+        } else {
+            whole.at(line, t)
+        };
+        if k == 0 { [at.u, at.uu] } else { [at.v, at.vv] }
+    };
+    // Second derivatives of an offset are differences across the joint.
+    let most = if matches!(surface, Surface::Offset { .. }) {
+        1
+    } else {
+        2
+    };
+    lines(ranges[1 - k])
+        .map(|line| {
+            let [before, after] = [-BESIDE, BESIDE].map(|by| derivatives(joint + by * width, line));
+            let speed = before[0].length();
+            let is_tangent = before[0].distance(after[0]) <= FIRST_JUMP * speed;
+            let is_curved_alike = before[1].distance(after[1]) * width <= SECOND_JUMP * speed;
+            match (is_tangent, is_curved_alike) {
+                // A line that is a point says nothing.
+                _ if speed == 0.0 => most,
+                (true, true) => most,
+                (true, false) => 1,
+                (false, _) => 0,
+            }
+        })
+        .min()
+        .unwrap_or(0)
+}
+
+/// Even places of the range across, on which a direction is measured.
+fn lines(across: [f64; 2]) -> impl Iterator<Item = f64> {
+    (0..LINES).map(move |line| across[0] + (across[1] - across[0]) * line as f64 / (LINES - 1) as f64)
+}
+
 /// Knots of one direction with which the lines in that direction are within the tolerance.
 fn direction(
     surface: &Surface,
@@ -144,7 +200,7 @@ fn direction(
     let mut breaks = vec![(range[0], 0)];
     // A break of continuity C2 or more needs no knot of its own.
     breaks.extend(
-        joints(surface, k, range)
+        measured_joints(surface, k, ranges)
             .into_iter()
             .filter(|(_, order)| *order < 2),
     );
@@ -182,7 +238,7 @@ fn fewest(surface: &Surface, k: usize, ranges: [[f64; 2]; 2], tolerance_mm: f64)
     let range = ranges[k];
     let mut breaks = vec![(range[0], 0)];
     breaks.extend(
-        joints(surface, k, range)
+        measured_joints(surface, k, ranges)
             .into_iter()
             .filter(|(_, order)| *order == 0),
     );
@@ -220,8 +276,7 @@ fn errors(
         whole.at(u, v).point
     };
     let mut worst = vec![0.0_f64; parts.len()];
-    for line in 0..LINES {
-        let line = other[0] + (other[1] - other[0]) * line as f64 / (LINES - 1) as f64;
+    for line in lines(other) {
         let points: Vec<DVec3> = collocation.places.iter().map(|t| point(*t, line)).collect();
         if !points.iter().all(|point| point.is_finite()) {
             return Err(FitError::NotFinite);

@@ -94,6 +94,60 @@ fn a_fit_over_the_seam_follows_the_surface() {
     }
 }
 
+/// A circle of four rational arcs has double knots, and a seam, at which it has no corner: nor has its fit.
+#[test]
+fn a_fit_has_no_corner_where_the_surface_has_none() {
+    let side = std::f64::consts::FRAC_1_SQRT_2;
+    let around = [
+        [1.0, 0.0],
+        [1.0, 1.0],
+        [0.0, 1.0],
+        [-1.0, 1.0],
+        [-1.0, 0.0],
+        [-1.0, -1.0],
+        [0.0, -1.0],
+        [1.0, -1.0],
+        [1.0, 0.0],
+    ];
+    // A crown of degree 5: no exact form.
+    let profile = [9.0, 9.6, 10.1, 10.2, 9.9, 9.4];
+    let pole = |row: usize, radius: f64, column: usize| {
+        let weight = if column.is_multiple_of(2) { 1.0 } else { side };
+        let [x, y] = around[column].map(|share| weight * share * radius);
+        [x, y, weight * row as f64, weight]
+    };
+    let spline = SplineSurface {
+        axes: [
+            Axis {
+                degree: 5,
+                knots: [[0.0; 6], [1.0; 6]].concat(),
+            },
+            Axis {
+                degree: 2,
+                knots: [0, 0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 4].map(f64::from).to_vec(),
+            },
+        ],
+        poles: profile
+            .iter()
+            .enumerate()
+            .map(|(row, radius)| (0..9).map(|column| pole(row, *radius, column)).collect())
+            .collect(),
+    };
+    let surface = Surface::Spline(spline);
+    for knots in [Knots::OfSurface, Knots::Fewest] {
+        let (fitted, said) = fit::fit(&surface, [[0.0, 1.0], [3.3, 4.7]], 1e-3, knots).unwrap();
+        assert!(said.max_mm <= 1e-3, "{said:?}");
+        for knot in fitted.axes[1].breaks() {
+            if knot <= 3.3 || knot >= 4.7 {
+                continue;
+            }
+            let [before, after] = [-1e-9, 1e-9].map(|by| fitted.at(0.4, knot + by).v);
+            let corner = before.angle_between(after);
+            assert!(corner < 1e-7, "{corner} rad at {knot}, {knots:?}");
+        }
+    }
+}
+
 /// A surface of more pieces than the store holds, smooth but for the jumps of its second derivative, takes few patches.
 #[test]
 fn knots_that_the_tolerance_does_not_need_are_left_out() {
