@@ -8,6 +8,8 @@ use crate::tool::{Reason, Tool};
 
 /// The share of the tool's permitted depth that a region uses; the rest is for rounding.
 const DEPTH_SHARE: f64 = 0.5;
+/// The share of it within which a place is surely clear, see [`Clearance::surely`].
+const SURE_SHARE: f64 = 0.1;
 /// Places of the own face nearer to the contact than this share of the ball's radius do not count: there the fit of the ball decides.
 const OWN_SHARE: f64 = 0.3;
 /// Ball radius times the curvature towards it, at most: towards 1 the step-over grows without bound, and the board refuses what is above.
@@ -65,6 +67,23 @@ impl Clearance<'_> {
     /// # Errors
     /// The rule.
     pub fn check(&self, uv: [f64; 2]) -> Result<(), Reason> {
+        self.check_to(uv, DEPTH_SHARE)
+    }
+
+    /// Whether a place is clear with something to spare: a place next to it, within [`Self::spacing_mm`] of three others such, is clear to the permitted depth.
+    #[must_use]
+    pub fn surely(&self, uv: [f64; 2]) -> bool {
+        self.check_to(uv, SURE_SHARE).is_ok()
+    }
+
+    /// Spacing of a square grid on a plane, mm, between whose points an obstacle enters the tool by at most the permitted depth, where it does by at most
+    /// [`SURE_SHARE`] of it at the points: over a point of the part the depth falls by d^2 / (2 r) at a distance d.
+    #[must_use]
+    pub fn spacing_mm(&self) -> f64 {
+        2.0 * ((1.0 - 2.0 * SURE_SHARE) * self.touch_mm * self.tool.radius).sqrt()
+    }
+
+    fn check_to(&self, uv: [f64; 2], share: f64) -> Result<(), Reason> {
         let (place, fits) = self.place(uv);
         if place.normal.z.is_nan() || place.normal.z < self.normal_z_min {
             return Err(Reason::Steep);
@@ -72,10 +91,10 @@ impl Clearance<'_> {
         if !fits {
             return Err(Reason::Fit);
         }
-        self.check_part(&place)
+        self.check_part(&place, share * self.touch_mm)
     }
 
-    fn check_part(&self, place: &Place) -> Result<(), Reason> {
+    fn check_part(&self, place: &Place, depth: f64) -> Result<(), Reason> {
         let Some((part, own)) = self.part else {
             return Ok(());
         };
@@ -85,7 +104,6 @@ impl Clearance<'_> {
             place: place.point,
             radius: OWN_SHARE * self.tool.radius,
         });
-        let depth = DEPTH_SHARE * self.touch_mm;
         if part
             .nearest(centre, self.tool.radius - depth, own.as_ref(), true)
             .is_some()

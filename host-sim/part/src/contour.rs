@@ -1,5 +1,6 @@
 //! The boundary of a set of places that is known by a question alone: marching squares on a grid, vertices bisected to the boundary, chords halved
-//! until they follow it, then pulled in and left with the fewest vertices that stay inside.
+//! until they follow it, then pulled in and left with the fewest vertices that stay inside. Where a cell of the grid has places outside
+//! between corners that are inside, a grid twice as fine is taken.
 
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -32,14 +33,19 @@ pub struct Set<'a> {
     pub rectangle: [[f64; 2]; 2],
     /// Lengths of the derivatives by u and v, mm: at most.
     pub metric: [f64; 2],
+    /// How much closer together the places of the grid are along u and v.
+    pub finer: [f64; 2],
     /// Whether a place is in it.
     pub holds: &'a (dyn Fn(Place) -> bool + Sync),
+    /// Whether a place of it is so far inside that four such around a cell of the grid have no place outside between them.
+    pub is_sure: &'a (dyn Fn(Place) -> bool + Sync),
 }
 
 /// The grid with its answers; one line of places beyond each side is outside.
 struct Grid {
     counts: [usize; 2],
     holds: Vec<bool>,
+    surely: Vec<bool>,
 }
 
 impl Grid {
@@ -68,7 +74,7 @@ impl Set<'_> {
     }
 
     fn grid(&self, spacing: f64) -> Grid {
-        let size = |k: usize| (self.rectangle[k][1] - self.rectangle[k][0]) * self.metric[k];
+        let size = |k: usize| (self.rectangle[k][1] - self.rectangle[k][0]) * self.metric[k] * self.finer[k];
         let wanted = (size(0) / spacing).ceil() * (size(1) / spacing).ceil();
         let spacing = spacing * (wanted / PLACES_MAX as f64).max(1.0).sqrt();
         #[allow(
@@ -80,17 +86,46 @@ impl Set<'_> {
         let mut grid = Grid {
             counts,
             holds: vec![false; (counts[0] + 3) * (counts[1] + 3)],
+            surely: vec![false; (counts[0] + 3) * (counts[1] + 3)],
         };
         let width = counts[0] + 3;
-        grid.holds.par_chunks_mut(width).enumerate().for_each(|(j, row)| {
+        let rows = grid
+            .holds
+            .par_chunks_mut(width)
+            .zip(grid.surely.par_chunks_mut(width));
+        rows.enumerate().for_each(|(j, (holds, surely))| {
             if j == 0 || j == counts[1] + 2 {
                 return;
             }
-            for (i, holds) in row.iter_mut().enumerate().take(counts[0] + 2).skip(1) {
-                *holds = (self.holds)(self.place(counts, i, j));
+            for i in 1..counts[0] + 2 {
+                let place = self.place(counts, i, j);
+                holds[i] = (self.holds)(place);
+                surely[i] = holds[i] && (self.is_sure)(place);
             }
         });
         grid
+    }
+
+    /// Whether a cell whose corners are in the set has a place outside: its middle, or that of a side.
+    fn misses(&self, grid: &Grid) -> bool {
+        let [nu, nv] = grid.counts;
+        (1..=nv).into_par_iter().any(|j| {
+            (1..=nu).any(|i| {
+                let corners = [(i, j), (i + 1, j), (i, j + 1), (i + 1, j + 1)];
+                if !corners.iter().all(|(i, j)| grid.at(*i, *j))
+                    || corners.iter().all(|(i, j)| grid.surely[grid.index(*i, *j)])
+                {
+                    return false;
+                }
+                let ([u0, v0], [u1, v1]) = (
+                    self.place(grid.counts, i, j),
+                    self.place(grid.counts, i + 1, j + 1),
+                );
+                let [u, v] = [0.5 * (u0 + u1), 0.5 * (v0 + v1)];
+                let middles = [[u, v], [u, v0], [u, v1], [u0, v], [u1, v]];
+                middles.into_iter().any(|place| !(self.holds)(place))
+            })
+        })
     }
 
     /// The place nearest to the boundary on the inner side.
@@ -127,9 +162,14 @@ impl Set<'_> {
     /// Closed polygons around the set, inside of it; the set is on their left.
     #[must_use]
     pub fn contours(&self, precision: &Precision) -> Vec<Vec<Place>> {
-        let grid = self.grid(precision.grid_mm);
+        let mut step = precision.grid_mm;
+        let mut grid = self.grid(step);
+        // Once is enough: a quarter of what is between places at the whole spacing is between those at half of it.
+        if self.misses(&grid) {
+            step *= 0.5;
+            grid = self.grid(step);
+        }
         let loops = self.marched(&grid);
-        let step = precision.grid_mm;
         loops
             .into_par_iter()
             .filter_map(|rough| {

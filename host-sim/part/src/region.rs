@@ -27,6 +27,8 @@ const CHORD_MM: f64 = 0.003;
 /// Farther in for fewer vertices, mm.
 const SIMPLIFY_MM: f64 = 0.01;
 
+/// Most that the grid is made finer where the ball's centre moves farther than the contact, as around an edge.
+const STRETCH_MAX: f64 = 4.0;
 /// A side shorter than this is a point, mm.
 const POLE_MM: f64 = 1e-6;
 /// Radius around such a point that no pass enters, in step-overs.
@@ -81,6 +83,16 @@ pub struct Made {
     pub inside_mm2: f64,
     /// The largest ball that reaches 99 % of what is not too steep, mm; `None` if no ball above 0.05 mm does.
     pub radius_mm: Option<f64>,
+}
+
+/// What is seen of a face at some places.
+struct Looks {
+    /// Largest derivatives by u and v, mm.
+    metric: [f64; 2],
+    /// How much farther the ball's centre moves along u and v than the contact, at most; at least 1.
+    stretch: [f64; 2],
+    /// The largest step-over, mm.
+    step: f64,
 }
 
 /// The edges of the face, to grow it by.
@@ -141,11 +153,11 @@ impl Request<'_> {
         )
     }
 
-    /// Largest derivatives and the largest step-over on the face, mm.
-    fn looks(&self, rectangle: [[f64; 2]; 2]) -> ([f64; 2], f64) {
+    /// Looks at the face.
+    fn looks(&self, rectangle: [[f64; 2]; 2]) -> Looks {
         let r = self.tool.radius;
         let plane = (8.0 * r * self.scallop_mm).sqrt();
-        let (mut metric, mut step) = ([1e-9_f64; 2], plane);
+        let (mut metric, mut of_centre, mut step) = ([1e-9_f64; 2], [0.0_f64; 2], plane);
         let clearance = self.clearance();
         for i in 0..=LOOKS {
             for j in 0..=LOOKS {
@@ -160,10 +172,28 @@ impl Request<'_> {
                     let [_, most] = at.principal_curvatures(place.normal);
                     let share = (1.0 - r * most).max(1.0 / STEP_MAX / STEP_MAX);
                     step = step.max(plane / share.sqrt());
+                    let centre = |uv: [f64; 2]| {
+                        let (place, _) = clearance.place(uv);
+                        place.point + place.normal * r
+                    };
+                    for (k, of_centre) in of_centre.iter_mut().enumerate() {
+                        let by = 1e-6 * (rectangle[k][1] - rectangle[k][0]);
+                        let [before, after] = [-by, by].map(|by| {
+                            let mut uv = [u, v];
+                            uv[k] = (uv[k] + by).clamp(rectangle[k][0], rectangle[k][1]);
+                            centre(uv)
+                        });
+                        // At an end the difference is over half of it; `max` leaves out what is not a number.
+                        *of_centre = of_centre.max(0.5 * before.distance(after) / by);
+                    }
                 }
             }
         }
-        (metric, step)
+        Looks {
+            metric,
+            stretch: [0, 1].map(|k| (of_centre[k] / metric[k]).clamp(1.0, STRETCH_MAX)),
+            step,
+        }
     }
 
     /// What can be reached, without a region: by `side` x `side` places around the face.
@@ -180,7 +210,11 @@ impl Request<'_> {
     pub fn make(&self) -> Made {
         let trimmed = Inside::new(self.trimmed);
         let domain = self.surface.domain();
-        let (metric, step) = self.looks(domain);
+        let Looks {
+            metric,
+            stretch,
+            step,
+        } = self.looks(domain);
         // What is beside the face is not known without the part.
         let grow_mm = if self.part.is_some() { GROWTH * step } else { 0.0 };
         let rectangle = self.rectangle(domain, metric, grow_mm);
@@ -199,21 +233,22 @@ impl Request<'_> {
         let border = self.border();
         let poles = self.poles(domain);
         let beside_pole = |point: DVec3| poles.iter().any(|pole| pole.distance(point) < POLE_STEPS * step);
-        let holds = |place: [f64; 2]| {
+        let is_wanted = |place: [f64; 2]| {
             if !poles.is_empty() && beside_pole(self.surface.at(place[0], place[1]).point) {
                 return false;
             }
-            (trimmed.contains(place)
-                || grow_mm > 0.0 && border.is_near(self.surface.at(place[0], place[1]).point, grow_mm))
-                && clearance.check(place).is_ok()
+            trimmed.contains(place)
+                || grow_mm > 0.0 && border.is_near(self.surface.at(place[0], place[1]).point, grow_mm)
         };
         let set = Set {
             rectangle,
             metric,
-            holds: &holds,
+            finer: stretch,
+            holds: &|place| is_wanted(place) && clearance.check(place).is_ok(),
+            is_sure: &|place| clearance.surely(place),
         };
         made.loops = set.contours(&Precision {
-            grid_mm: 2.0 * (self.tool.radius * self.touch_mm).sqrt(),
+            grid_mm: clearance.spacing_mm(),
             chord_mm: CHORD_MM,
             inset_mm: INSET_MM,
             simplify_mm: SIMPLIFY_MM,

@@ -171,6 +171,35 @@ fn a_region_ends_beside_a_boss_by_the_balls_radius() {
     }
 }
 
+/// A pin that the ball enters by more than it may within a tenth of a millimetre only: wherever it is in the grid, the region leaves it out.
+#[test]
+fn a_region_leaves_out_what_is_between_the_places_of_its_grid() {
+    let tool = Tool::new(4.0, &ToolBody::default());
+    for case in 0..24_i32 {
+        let [x, y] = [0.754_877, 0.569_840].map(|part: f64| (part * f64::from(case)).fract() * 0.2);
+        let surface = flat(-10.0, 10.0, |_, _| 0.0);
+        let outer = [[-9.0 + x, -9.0 + y], [9.0, -9.0 + y], [9.0, 9.0], [-9.0 + x, 9.0]];
+        let corners = outer.map(|[x, y]| dvec3(x, y, 0.0));
+        let pin = [
+            face(
+                1,
+                plane(0.0),
+                vec![polygon(&corners), circle(0.01, 0.0, -1.0)],
+                1.0,
+            ),
+            boss(2, 0.01, [0.0, 0.0021]),
+            face(3, plane(0.0021), vec![circle(0.01, 0.0021, 1.0)], 1.0),
+        ];
+        let made = region(&pin, &surface, &[outer.to_vec()], &tool);
+        let inside = crate::inside::Inside::new(&made.loops);
+        assert!(!inside.contains([0.02, 0.0]), "case {case}");
+        assert!(
+            inside.contains([0.2, 0.0]) && inside.contains([0.0, -0.2]),
+            "case {case}"
+        );
+    }
+}
+
 /// A boss lower than the ball's centre is touched by the ball's flank: at the height h at the distance sqrt(r^2 - (r - h)^2).
 #[test]
 fn a_low_boss_is_passed_by_the_balls_flank() {
