@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use inspect::BOUNDS;
 use interp_core::job::links::Detour;
 use interp_core::job::region::{CROSSINGS_MAX, EDGE_WORDS};
-use job::{Along, AxisLimits, Job, MachineSpec, Pattern, Region, Side, Spacing};
+use job::{Along, AxisLimits, Job, MachineSpec, NurbsSpec, Pattern, Region, Side, Spacing, SurfaceSpec};
 use machine::links::{self, Link};
 use machine::prepare::{Prepared, prepare};
 use verify::swept::{Requirements, measure};
@@ -230,6 +230,37 @@ fn regions_that_the_machine_does_not_take() {
         "{}",
         refused(&job)
     );
+}
+
+/// A first pass that ends at a slant edge of its region where its interval is narrowest: the lines beside it are placed anew until its end, and seen along all of
+/// it by a second look. On a plane, 1 mm wide at one end and 18 mm at the other, wider from line to line.
+#[test]
+fn a_first_pass_that_is_narrowest_at_the_edge_of_its_region() {
+    let row = |x: f64, width: f64| [0.0, 0.5, 1.3].map(|y| [x, width * y, 0.0, 1.0]).to_vec();
+    let mut job = load("plate_machine");
+    job.surface = SurfaceSpec::Nurbs(NurbsSpec {
+        degree: [1, 2],
+        knots_u: vec![0.0, 0.0, 1.0, 1.0],
+        knots_v: vec![0.0, 0.0, 0.0, 1.0, 1.0, 1.0],
+        poles_mm: vec![row(5.0, 1.0), row(60.0, 14.0)],
+        rational: false,
+    });
+    (job.along, job.radius_mm, job.machine.travel_mm) = (Along::U, 3.0, None);
+    job.machine.limits = Some(AxisLimits::DEFAULT);
+    for step in 0..8 {
+        let end = 0.6 + 0.04 * f64::from(step);
+        job.region = Some(Region::new(vec![vec![
+            [0.0, 0.0],
+            [end, 0.0],
+            [1.0, 0.2],
+            [1.0, 0.4],
+            [0.0, 0.4],
+        ]]));
+        let followed = follow(&job);
+        let requirements = Requirements::default();
+        let swept = measure(&job, &followed.oracle, &followed.track, true, &requirements, &());
+        assert_eq!(swept.failures, Vec::<String>::new(), "{end}");
+    }
 }
 
 /// Links with heights of their own leave the passes as they are; each rises to its height, and no farther than a hop of its length gains by; within the limits, in less time.

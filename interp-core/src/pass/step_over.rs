@@ -348,7 +348,8 @@ impl StepOverEstimator {
         step
     }
 
-    /// Whether the first pass is to be looked at again, because its lines were placed far from the step that they showed. They are placed by it then.
+    /// Whether the first pass is to be looked at again, because its lines were placed far from the step that they showed, or so late that they were not seen
+    /// along all of it. They are placed by that step then.
     pub(crate) fn looks_again(&mut self, header: &Header) -> bool {
         if !self.is_first() || self.looked_again {
             return false;
@@ -356,9 +357,10 @@ impl StepOverEstimator {
         let Some((step, _)) = self.allowed(header, PassMaximum::NONE) else {
             return false;
         };
-        let [_, whole] = &self.lines;
-        let is_far = (step - whole.distance).abs() > AGAIN_MIN * whole.distance && step < f32::INFINITY;
-        if is_far && !whole.is_at_boundary {
+        let [half, whole] = &self.lines;
+        let is_far = (step - whole.distance).abs() > AGAIN_MIN * whole.distance && !whole.is_at_boundary;
+        let are_seen = half.is_seen(self.patches) && whole.is_seen(self.patches);
+        if step < f32::INFINITY && (is_far || !are_seen) {
             self.looked_again = true;
             self.expected = step;
         }

@@ -227,10 +227,19 @@ impl NeighbourLine {
         }
     }
 
+    /// Whether it was evaluated beside this number of patches, or cannot be.
+    pub(super) fn is_seen(&self, patches: u16) -> bool {
+        match self.task {
+            Task::EvaluateLast => self.spans >= patches,
+            Task::Idle => true,
+            Task::Place | Task::Patch | Task::Start | Task::Evaluate | Task::End => false,
+        }
+    }
+
     /// Maximum inverse square interval on the line beside this number of patches; for a line evaluated in part, at least that of the pass.
     pub(super) fn found(&self, patches: u16, here: f32) -> Option<f32> {
         match self.task {
-            Task::EvaluateLast if self.spans >= patches => Some(self.peak.most),
+            Task::EvaluateLast if self.is_seen(patches) => Some(self.peak.most),
             Task::EvaluateLast | Task::End | Task::Evaluate => Some(self.peak.most.at_least(here)),
             Task::Place | Task::Patch | Task::Start | Task::Idle => None,
         }
