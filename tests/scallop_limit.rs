@@ -50,6 +50,43 @@ fn check(name: &str, job: &Job, own: f64) {
     );
 }
 
+/// A plane between a straight side and a parabola whose vertex is at this share of the passes, a knot in their middle: passes are closest together there.
+fn widest_at(vertex: f64, limits: Option<AxisLimits>) -> Job {
+    let job = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../jobs/plate_machine.toml");
+    let mut job = job_file::load(&job).unwrap();
+    // Poles of w(t) = 5 (1 - 1.5 (t - vertex)^2), by blossoms at pairs of knots.
+    let pole = |[a, b]: [f64; 2]| {
+        let square = a * b - vertex * (a + b) + vertex * vertex;
+        [6.0 * 0.5 * (a + b), 5.0 * (1.0 - 1.5 * square)]
+    };
+    let side = [[0.0, 0.0], [0.0, 0.5], [0.5, 1.0], [1.0, 1.0]].map(pole);
+    job.surface = SurfaceSpec::Nurbs(NurbsSpec {
+        degree: [2, 1],
+        knots_u: vec![0.0, 0.0, 0.0, 0.5, 1.0, 1.0, 1.0],
+        knots_v: vec![0.0, 0.0, 1.0, 1.0],
+        poles_mm: side
+            .iter()
+            .map(|[x, y]| vec![[*x, 0.0, 0.0, 1.0], [*x, *y, 0.0, 1.0]])
+            .collect(),
+        rational: false,
+    });
+    (job.along, job.radius_mm, job.scallop_mm) = (Along::U, 3.0, 0.02);
+    (job.machine.travel_mm, job.machine.limits) = (None, limits);
+    job
+}
+
+/// The place where passes are closest together counts wherever it is, also at the first stations of a pass's last patch.
+#[test]
+fn the_narrowest_place_of_a_pass() {
+    for step in 0..=8 {
+        let vertex = 0.3 + 0.05 * f64::from(step);
+        for limits in [None, Some(AxisLimits::DEFAULT)] {
+            let name = format!("widest at {vertex}, {}", limits.is_some());
+            check(&name, &widest_at(vertex, limits), 0.0);
+        }
+    }
+}
+
 /// Every face that imports with the defaults.
 #[test]
 fn faces_of_cad_files() {

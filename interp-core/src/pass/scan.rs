@@ -271,8 +271,12 @@ impl PassScan {
         }
         let first = self.station == 0;
         let last = self.is_end() && self.route.next(job, &self.piece).is_none();
-        self.estimator
-            .evaluations(first, first && self.is_first_patch, last)
+        self.estimator.evaluations(
+            self.piece.position.span,
+            first,
+            first && self.is_first_patch,
+            last,
+        )
     }
 
     /// Advances to the next station, the next patch, the second lap, or the end.

@@ -202,15 +202,16 @@ impl StepOverEstimator {
         self.before.is_none()
     }
 
-    /// Evaluations at a station: one for each neighbouring line, two where its patch has to be collapsed, and more at the passes' ends. `begins_patch`,
-    /// `begins`, `ends`: the station is the first of a patch, the first and the last of the pass.
-    pub(crate) fn evaluations(&self, begins_patch: bool, begins: bool, ends: bool) -> u8 {
+    /// Evaluations at a station in this span: one for each neighbouring line, two where its patch has to be collapsed, three where that is the last one, and more
+    /// at the passes' ends. `begins_patch`, `begins`, `ends`: the station is the first of a patch, the first and the last of the pass.
+    pub(crate) fn evaluations(&self, span: u16, begins_patch: bool, begins: bool, ends: bool) -> u8 {
         let rounds = 1 + u8::from(self.is_first());
         let of_end = |is_whole: bool| 4 + u8::from(is_whole) * rounds * edge::EVALUATIONS;
         let [start, end] = self.is_whole;
         let at_start = if begins { of_end(start) } else { 0 };
         let at_end = if ends { of_end(end) } else { 0 };
-        2 + 2 * u8::from(begins_patch) + at_start + at_end
+        let of_patch = 2 * u8::from(begins_patch) + 2 * u8::from(begins_patch && span == self.last_span);
+        2 + of_patch + at_start + at_end
     }
 
     /// Whether the next task at this fraction of this patch collapses a patch.
@@ -247,7 +248,8 @@ impl StepOverEstimator {
     fn due_search(&self, is_end: bool) -> Option<bool> {
         let [half, whole] = &self.lines;
         let [at_start, at_end] = self.searches;
-        if at_start && whole.spans == 1 && whole.task == Task::Evaluate && half.task == Task::Patch {
+        let is_evaluated = matches!(whole.task, Task::Evaluate | Task::End);
+        if at_start && whole.spans == 1 && is_evaluated && half.task == Task::Patch {
             return Some(false);
         }
         let are_seen = self.at_last >= 2 && whole.task == Task::EvaluateLast;

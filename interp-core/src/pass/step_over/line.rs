@@ -95,6 +95,8 @@ pub(super) struct NeighbourLine {
     pub(super) placed_for: f32,
     /// The farther line is at the surface's boundary.
     pub(super) is_at_boundary: bool,
+    /// It was placed again after the start of the pass: what is beside it before that was not seen.
+    is_late: bool,
     /// Inverse square interval on the line.
     pub(super) peak: Peak,
 }
@@ -112,6 +114,7 @@ impl NeighbourLine {
             distance: 0.0,
             placed_for: 0.0,
             is_at_boundary: false,
+            is_late: false,
             peak: Peak::NONE,
         }
     }
@@ -126,6 +129,7 @@ impl NeighbourLine {
     pub(super) const fn begin(&mut self) {
         self.task = Task::Place;
         self.spans = 0;
+        self.is_late = false;
         self.peak = Peak::NONE;
     }
 
@@ -153,18 +157,19 @@ impl NeighbourLine {
             is_last,
         } = place;
         let is_first = expected.is_none();
+        let next = if *is_last { Task::End } else { Task::Evaluate };
         self.task = match self.task {
             Task::Place => self.place(job, position, most, expected, spans),
             _ if is_first && most > REPLACE_FACTOR * self.placed_for => {
+                self.is_late = true;
                 self.place(job, position, most, expected, spans)
             }
             Task::Patch => self.make_patch(job, position, Task::Start),
             Task::Start => {
                 self.see_end(job, *start);
-                Task::Evaluate
+                next
             }
-            Task::Evaluate if self.span != position.span => self.make_patch(job, position, Task::Evaluate),
-            Task::Evaluate if *is_last => Task::End,
+            Task::Evaluate if self.span != position.span => self.make_patch(job, position, next),
             Task::End => {
                 self.see_end(job, *end);
                 Task::EvaluateLast
@@ -230,7 +235,7 @@ impl NeighbourLine {
     /// Whether it was evaluated beside this number of patches, or cannot be.
     pub(super) fn is_seen(&self, patches: u16) -> bool {
         match self.task {
-            Task::EvaluateLast => self.spans >= patches,
+            Task::EvaluateLast => self.spans >= patches && !self.is_late,
             Task::Idle => true,
             Task::Place | Task::Patch | Task::Start | Task::Evaluate | Task::End => false,
         }

@@ -231,7 +231,8 @@ impl Lookahead {
         let begins = first && self.patches == 0;
         let ends = self.is_end() && out.route.next(job, &self.piece).is_none();
         let estimator = estimator.filter(|_| job.header.spacing.is_exact());
-        Task::Estimate(estimator.map_or(0, |estimator| estimator.evaluations(first, begins, ends)))
+        let span = self.piece.position.span;
+        Task::Estimate(estimator.map_or(0, |estimator| estimator.evaluations(span, first, begins, ends)))
     }
 
     /// Evaluates the station: fit of the ball, travel, inverse square interval, arc.
