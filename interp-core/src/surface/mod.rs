@@ -43,7 +43,7 @@ pub(crate) use revolved::{CirclePass, ProfilePass};
 pub(crate) use side_curve::SideCurve;
 
 use crate::fault::{Fault, FaultKind, Result};
-use crate::math::arith::{dot_float, dot_hi, fraction_32, inverse_sqrt, power_of_two, sqrt, to_f32};
+use crate::math::arith::{dot_float, fraction_32, inverse_sqrt, sqrt};
 use crate::math::vec3::Vec3;
 
 /// Least sine between the two first derivatives (after any flagged zero is divided out) at which a normal is computed.
@@ -113,7 +113,7 @@ impl PathSpeed {
         let inverse = inverse_sqrt(speed.dot(speed));
         Self {
             inv_speed: inverse * gauge,
-            log_speed_derivative: log_speed_derivative(path, path2, inverse * inverse, excess),
+            log_speed_derivative: log_speed_derivative(speed, path2, inverse * inverse, excess),
         }
     }
 
@@ -183,11 +183,10 @@ pub(crate) struct Derivatives {
     pub(crate) side2: Vec3,
 }
 
-/// `A . A' / |A|^2` from g A, half of g A' and 1/|g A|^2.
+/// `A . A' / |A|^2` from g A, half of g A' and 1/|g A|^2. In single precision: of a patch much narrower than long, both have few of the 32 bits.
 #[inline(always)]
-fn log_speed_derivative(path: &[i32; 3], path2: &[i32; 3], inverse_e: f32, excess: f32) -> f32 {
-    const PRODUCT: f32 = power_of_two(33);
-    to_f32(dot_hi(path, path2)) * (inverse_e * PRODUCT) - excess
+fn log_speed_derivative(path: Vec3, path2: &[i32; 3], inverse_e: f32, excess: f32) -> f32 {
+    path.dot(Vec3::of(*path2)) * (2.0 * inverse_e) - excess
 }
 
 impl Local {
@@ -236,9 +235,9 @@ impl Local {
 
         let product = ball.product() * self.g;
         let slant = b * f * inverse_e;
-        let l = to_f32(dot_hi(&offset, &self.path2)) * product;
+        let l = dot_float(&offset, &self.path2) * product;
         let (shear, shear_sum) = if MIXED {
-            let m = to_f32(dot_hi(&offset, &self.mixed)) * (0.5 * product);
+            let m = dot_float(&offset, &self.mixed) * (0.5 * product);
             let shear = m - slant * l;
             (shear, m + shear)
         } else {
@@ -267,7 +266,7 @@ impl Local {
             offset,
             path: PathSpeed {
                 inv_speed: inverse * inverse_a * self.g,
-                log_speed_derivative: log_speed_derivative(&self.path, &self.path2, inverse_e, self.excess),
+                log_speed_derivative: log_speed_derivative(path, &self.path2, inverse_e, self.excess),
             },
             along: 1.0 - l * inverse_e * inverse_a,
             lateral_squared,
