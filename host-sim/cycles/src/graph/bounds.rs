@@ -170,7 +170,7 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "stations of half a turn: STATIONS",
     ),
     (
-        "interp_core::pass::scan::PassScan::work",
+        "interp_core::pass::scan::PassScan::plan",
         33,
         "pieces of a portion: PIECES_MAX",
     ),
