@@ -13,7 +13,7 @@ use crate::event::{Event, Line, Problem, Target};
 use crate::image::Image;
 use crate::tell;
 
-/// Polling interval of an empty log. The buffer holds 1 KiB, about fifty lines.
+/// Polling interval of an empty log. The buffer holds 512 bytes, about twenty-five lines.
 const PAUSE: Duration = Duration::from_millis(10);
 /// Time after a reset in which the log must be initialised.
 const START: Duration = Duration::from_secs(2);

@@ -102,14 +102,14 @@ fn words(kind: FaultKind) -> [&'static str; 5] {
         FaultKind::DeadlineMissed => [
             "The sample timer ticked before the previous tick, or the planning that follows it, was complete. The tool decelerates along its path to standstill.",
             "The number of missed deadlines.",
-            "The processor was blocked for a whole period: by a debugger's breakpoint, or a defect of the firmware. The worst-case tick takes 6 % of the period, the planning 18 %.",
+            "The processor was blocked for a whole period: by a debugger's breakpoint, or a defect of the firmware. The worst-case tick takes 4 % of the period, the planning 22 %.",
             "Run without a debugger. If the fault recurs, please report the job with the firmware's log (`cargo sim run` reports the tick).",
             "A breakpoint in the firmware while a job runs on the board's own clock.",
         ],
         FaultKind::TickOverBudget => [
             "A tick took more than a fifth of the period. The tool decelerates along its path to standstill.",
             "The processor cycles of the tick.",
-            "The worst-case tick found takes 5.4 % of the period, and the pulses of three axes at 400 kHz add 9 %. Either the search did not find this case, or other interrupts took the rest.",
+            "The worst-case tick found takes 4.0 % of the period (13.8 % where it is a fault already), and the pulses of three axes at 400 kHz add 9 %. Either the search did not find this case, or other interrupts took the rest.",
             "Please report the job; a lower feed makes the costliest ticks rarer. `cargo sim budget JOB` counts the cycles of each stage.",
             "An interrupt handler of 40000 cycles with a higher priority than the sample task.",
         ],

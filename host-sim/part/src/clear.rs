@@ -76,8 +76,8 @@ impl Clearance<'_> {
         self.check_to(uv, SURE_SHARE).is_ok()
     }
 
-    /// Spacing of a square grid on a plane, mm, between whose points an obstacle enters the tool by at most the permitted depth, where it does by at most
-    /// [`SURE_SHARE`] of it at the points: over a point of the part the depth falls by d^2 / (2 r) at a distance d.
+    /// Spacing of a square grid on a plane, mm, between whose places an obstacle enters the tool by at most the permitted depth, where it does by at most a
+    /// tenth of it at the places (as [`Self::surely`] says): over a point of the part the depth falls by d^2 / (2 r) at a distance d.
     #[must_use]
     pub fn spacing_mm(&self) -> f64 {
         2.0 * ((1.0 - 2.0 * SURE_SHARE) * self.touch_mm * self.tool.radius).sqrt()

@@ -16,8 +16,8 @@ use machine::remote::operate::follow;
 use machine::remote::session::Event;
 use machine::remote::{RemoteError, Session};
 
-/// Follows a run on a board to its end: keeps the heartbeat, and takes operator commands, typed with Enter: hold, resume, stop, abort, override 50,
-/// status. For a run whose `run` command has ended, or whose line broke. The run is not compared.
+/// Follows a run on a board to its end: keeps the heartbeat, and takes operator commands, typed with Enter: hold, pause, resume, stop, abort,
+/// override 50, status. For a run whose `run` command has ended, or whose line broke. The run is not compared.
 ///
 /// Example: cargo sim attach --port /dev/ttyUSB0
 #[derive(Debug, Args)]

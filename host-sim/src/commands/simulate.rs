@@ -42,7 +42,7 @@ pub(super) struct Arguments {
     /// Overwrites existing files of --trace and --report.
     #[arg(long)]
     force: bool,
-    /// Applies the operator commands in this file: lines `tick N: hold`, or resume, stop, abort, start, override P.
+    /// Applies the operator commands in this file: lines `tick N: hold`, or pause, resume, stop, abort, start, override P.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["report", "approach"])]
     script: Option<PathBuf>,
     /// Prints one JSON object instead of text.

@@ -24,7 +24,8 @@ use job::JobError;
 pub use play::{Played, play};
 
 /// What a line looks like.
-const FORM: &str = "write a line as `tick N: hold`, with hold, resume, stop, abort, start or `override P`";
+const FORM: &str =
+    "write a line as `tick N: hold`, with hold, pause, resume, stop, abort, start or `override P`";
 
 /// What the operator does in one period.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
