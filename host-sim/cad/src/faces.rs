@@ -127,3 +127,29 @@ pub fn machinable_once(
     }
     Ok(made)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tests::fits::tube;
+
+    /// Beyond its seam a closed face is compared with its beginning, which lies there.
+    #[test]
+    fn a_face_is_compared_beyond_its_seam() {
+        let spline = tube();
+        let [[start, end], _] = spline.domain();
+        let original = Original {
+            surface: crate::Surface::Spline(spline.clone()),
+            scale: 2.0,
+        };
+        let beside = DVec3::new(0.0, 0.0, 0.5);
+        for share in [0.1, 0.5, 0.9] {
+            let u = start + share * (end - start);
+            let point = spline.at(u, 0.3).point;
+            for u in [u, u + (end - start)] {
+                let from = original.from_surface(u, 0.3, point - beside);
+                assert!(from.distance(2.0 * beside) < 1e-9, "{from} at {u}");
+            }
+        }
+    }
+}

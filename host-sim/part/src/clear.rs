@@ -70,7 +70,8 @@ impl Clearance<'_> {
         self.check_to(uv, DEPTH_SHARE)
     }
 
-    /// Whether a place is clear with something to spare: a place next to it, within [`Self::spacing_mm`] of three others such, is clear to the permitted depth.
+    /// Whether a place is clear with something to spare: what lies between four such places, the corners of a square with sides of [`Self::spacing_mm`], is
+    /// clear to the permitted depth.
     #[must_use]
     pub fn surely(&self, uv: [f64; 2]) -> bool {
         self.check_to(uv, SURE_SHARE).is_ok()

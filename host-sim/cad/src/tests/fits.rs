@@ -37,7 +37,7 @@ fn a_face_that_is_larger_than_the_store_is_streamed() {
 }
 
 /// A closed tube of degree 5 about the z axis: periodic knots, uneven, of a period that is no round number.
-fn tube() -> SplineSurface {
+pub(crate) fn tube() -> SplineSurface {
     let spans = [0.7, 1.1, 0.9, 1.3, 0.8, 1.0, 1.2, 0.6].map(|width| width * PI / 10.0);
     let period: f64 = spans.iter().sum();
     let knot = |index: i32| {

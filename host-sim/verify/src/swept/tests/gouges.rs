@@ -69,7 +69,7 @@ fn ball_in_a_small_concave_radius_is_a_local_gouge() {
 #[test]
 fn gouge_of_a_part_is_held_to_its_tolerance() {
     let mut job = job(cylinder(4.0), Along::U, Side::Plus, 0.01);
-    // The arc is 2 um deep for a ball that is too large for it by 1 mm.
+    // From one edge of an arc 0.08 mm wide, a ball that is too large for it by 1 mm enters the other by 0.16 um.
     let half = 0.02_f64;
     let SurfaceSpec::Revolved { v_rad, .. } = &mut job.surface else {
         unreachable!()
