@@ -31,6 +31,7 @@ mod placement;
 mod plane;
 mod reader;
 mod remap;
+mod removal;
 mod spline;
 mod surface;
 #[cfg(test)]

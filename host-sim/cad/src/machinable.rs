@@ -4,6 +4,7 @@ use super::edges::along_edges;
 use super::exact::exact;
 use super::fit::{Deviation, FitError, Knots, deviation, fit};
 use super::plane::suited;
+use super::removal::without_needless_knots;
 use super::spline::SplineSurface;
 use super::surface::Periodic;
 use super::trim::{Polygon, trim};
@@ -270,6 +271,7 @@ fn converted(
     let mut why_fitted = "it has no exact form".to_owned();
     let mut streamed = None;
     if let Some(spline) = exact(&face.surface, rectangle) {
+        let spline = without_needless_knots(&spline);
         let degree = spline.axes.iter().map(|axis| axis.degree).max().unwrap_or(0);
         if degree <= DEGREE_EXACT {
             let nurbs = nurbs(&spline);

@@ -122,7 +122,7 @@ impl Axis {
 }
 
 /// A value that can be blended linearly: a pole, or a row of poles.
-trait Blend: Clone {
+pub(super) trait Blend: Clone {
     fn blend(&self, other: &Self, share: f64) -> Self;
 }
 
@@ -139,7 +139,7 @@ impl Blend for Vec<Pole> {
 }
 
 /// Inserts a knot once (P&T A5.1), which adds one pole.
-fn insert<P: Blend>(axis: &mut Axis, poles: &mut Vec<P>, t: f64) {
+pub(super) fn insert<P: Blend>(axis: &mut Axis, poles: &mut Vec<P>, t: f64) {
     let p = axis.degree;
     let k = axis.knots.partition_point(|knot| *knot <= t) - 1;
     let s = axis.multiplicity(t);

@@ -27,6 +27,8 @@ const CROSSING_MM: f64 = 0.02;
 const CHORD_SHARE: f64 = 0.1;
 /// Largest number of points of a loop from which on its intervals are not halved further: a loop of a file that makes sense has a tenth of it.
 const POINTS_MAX: usize = 50_000;
+/// Halvings of a side of a surface between two knots.
+const SIDE_HALVINGS: u32 = 12;
 /// Halvings of an interval between two points of an edge.
 const HALVINGS: u32 = 12;
 
@@ -137,12 +139,15 @@ pub fn trim(
     Ok(polygons)
 }
 
-/// The boundary of a face in space, on its surface, as polylines within the tolerance, mm; empty where it cannot be traced.
+/// The boundary of a face in space, on its surface, as polylines within the tolerance, mm; empty where it cannot be traced. A face without edges ends at the sides of
+/// its surface.
 #[must_use]
 pub fn polylines(face: &Face, tolerance_mm: f64) -> Vec<Vec<DVec3>> {
     let surface = &face.surface;
-    let Boundary::Loops(loops) = &face.boundary else {
-        return Vec::new();
+    let loops = match &face.boundary {
+        Boundary::Loops(loops) => loops,
+        Boundary::Natural => return sides(surface, tolerance_mm).unwrap_or_default(),
+        Boundary::Unknown(_) => return Vec::new(),
     };
     let on = Periodic::new(surface);
     let paths = paths(surface, loops);
@@ -156,6 +161,64 @@ pub fn polylines(face: &Face, tolerance_mm: f64) -> Vec<Vec<DVec3>> {
             points
         })
         .collect()
+}
+
+/// The four sides of a bounded surface in space.
+fn sides(surface: &Surface, tolerance_mm: f64) -> Option<Vec<Vec<DVec3>>> {
+    let [u, v] = surface.domain();
+    let domain = [u?, v?];
+    let corners = corners(domain);
+    let on = Periodic::new(surface);
+    let at = |place: [f64; 2]| on.at(place[0], place[1]).point;
+    let side = |k: usize| {
+        let (a, b) = (corners[k], corners[(k + 1) % 4]);
+        let along = k % 2;
+        let mut ends = vec![a];
+        let mut joints = surface.joints(along, domain[along]);
+        if a[along] > b[along] {
+            joints.reverse();
+        }
+        ends.extend(
+            joints
+                .into_iter()
+                .map(|joint| if along == 0 { [joint, a[1]] } else { [a[0], joint] }),
+        );
+        ends.push(b);
+        let mut points = vec![at(a)];
+        for ends in ends.windows(2) {
+            halved(&at, [ends[0], ends[1]], tolerance_mm, SIDE_HALVINGS, &mut points);
+        }
+        points.dedup();
+        points
+    };
+    Some((0..4).map(side).collect())
+}
+
+/// Adds points of a line of (u, v) in space after its first end, with chords within the tolerance of it, mm.
+fn halved(
+    at: &dyn Fn([f64; 2]) -> DVec3,
+    [a, b]: [[f64; 2]; 2],
+    tolerance_mm: f64,
+    left: u32,
+    points: &mut Vec<DVec3>,
+) {
+    let between = |share: f64| [0, 1].map(|k| a[k] + share * (b[k] - a[k]));
+    let ends = [at(a), at(b)];
+    let chord = ends[1] - ends[0];
+    let is_off = |share: f64| {
+        let beside = at(between(share)) - ends[0];
+        let on = (beside.dot(chord) / chord.length_squared()).clamp(0.0, 1.0);
+        // Of a chord without a length `on` is not a number.
+        beside.distance(if on.is_nan() { DVec3::ZERO } else { chord * on }) > tolerance_mm
+    };
+    // Once at least: an S may cross its chord.
+    if left == 0 || left < SIDE_HALVINGS && ![0.25, 0.5, 0.75].into_iter().any(is_off) {
+        points.push(ends[1]);
+        return;
+    }
+    let middle = between(0.5);
+    halved(at, [a, middle], tolerance_mm, left - 1, points);
+    halved(at, [middle, b], tolerance_mm, left - 1, points);
 }
 
 /// The corners of a rectangle.

@@ -4,16 +4,23 @@ use glam::DVec3;
 use oracle::Surface;
 
 use crate::body::{OwnContact, Part};
+use crate::proof::DISTANCE_ERROR_MM;
 use crate::tool::{Reason, Tool};
 
 /// The share of the tool's permitted depth that a region uses; the rest is for rounding.
 const DEPTH_SHARE: f64 = 0.5;
 /// The share of it within which a place is surely clear, see [`Clearance::surely`].
 const SURE_SHARE: f64 = 0.1;
-/// Places of the own face nearer to the contact than this share of the ball's radius do not count: there the fit of the ball decides.
+/// Places of the own face nearer to the contact than this share of the ball's radius do not count where the depth is below the error of a distance.
 const OWN_SHARE: f64 = 0.3;
 /// Ball radius times the curvature towards it, at most: towards 1 the step-over grows without bound, and the board refuses what is above.
 const FIT_MAX: f64 = 0.97;
+
+/// Sine of the angle between the derivatives by u and v, at least: below it, the board's normal is off by more than 1e-6 rad.
+const SKEW_MIN: f64 = 0.1;
+/// A derivative, at least, as a share of its change over the patch at its present rate; a normal between two rows of poles that coincide is off by 1e-6 rad
+/// where it is 0.02 to 0.04.
+const STATIONARY_MIN: f64 = 1.0 / 32.0;
 
 /// A face, the tool and the part.
 pub struct Clearance<'a> {
@@ -29,6 +36,8 @@ pub struct Clearance<'a> {
     pub touch_mm: f64,
     /// The part, and the index of the face in it; `None`: only the face's own rules.
     pub part: Option<(&'a Part, Option<usize>)>,
+    /// Parameters u and v at which its patches meet, with the ends of their ranges.
+    pub breaks: [Vec<f64>; 2],
 }
 
 /// A contact.
@@ -40,26 +49,46 @@ pub struct Place {
     pub normal: DVec3,
     /// Area of the surface for each unit of u and v, mm2.
     pub area: f64,
+    /// The surface itself is in the way of its passes.
+    pub fault: Option<Reason>,
 }
 
 impl Clearance<'_> {
-    /// The contact at a place, and whether the ball fits.
+    /// The contact at a place.
     #[must_use]
-    pub fn place(&self, [u, v]: [f64; 2]) -> (Place, bool) {
+    pub fn place(&self, [u, v]: [f64; 2]) -> Place {
         let at = self.surface.at(u, v);
         let cross = at.u.cross(at.v);
         let area = cross.length();
         let normal = cross * (self.sign / area);
-        let place = Place {
+        let lengths = [at.u.length(), at.v.length()];
+        let changes = [
+            at.uu.length() * self.patch(0, u),
+            at.vv.length() * self.patch(1, v),
+        ];
+        // Not true where something is not a number, either.
+        let is_regular = area > SKEW_MIN * lengths[0] * lengths[1]
+            && (0..2).all(|k| lengths[k] > STATIONARY_MIN * changes[k]);
+        let fault = if is_regular {
+            let [_, most] = at.principal_curvatures(normal);
+            (most * self.tool.radius > FIT_MAX).then_some(Reason::Fit)
+        } else {
+            Some(Reason::Degenerate)
+        };
+        Place {
             point: at.point,
             normal,
             area,
-        };
-        if area.is_nan() || area <= 1e-9 * at.u.length() * at.v.length() {
-            return (place, false);
+            fault,
         }
-        let [_, most] = at.principal_curvatures(normal);
-        (place, most * self.tool.radius <= FIT_MAX)
+    }
+
+    /// Length of the patch at a parameter.
+    fn patch(&self, k: usize, at: f64) -> f64 {
+        let breaks = &self.breaks[k];
+        let above = breaks.partition_point(|knot| *knot <= at);
+        let above = above.clamp(1, breaks.len() - 1);
+        breaks[above] - breaks[above - 1]
     }
 
     /// The first rule that a place breaks.
@@ -85,12 +114,12 @@ impl Clearance<'_> {
     }
 
     fn check_to(&self, uv: [f64; 2], share: f64) -> Result<(), Reason> {
-        let (place, fits) = self.place(uv);
-        if place.normal.z.is_nan() || place.normal.z < self.normal_z_min {
+        let place = self.place(uv);
+        if place.normal.z < self.normal_z_min {
             return Err(Reason::Steep);
         }
-        if !fits {
-            return Err(Reason::Fit);
+        if let Some(fault) = place.fault {
+            return Err(fault);
         }
         self.check_part(&place, share * self.touch_mm)
     }
@@ -100,6 +129,8 @@ impl Clearance<'_> {
             return Ok(());
         };
         let centre = place.point + place.normal * self.tool.radius;
+        // The ball touches its own face in the contact: at no depth below the error of a distance can it be told from entering there.
+        let own = own.filter(|_| depth < DISTANCE_ERROR_MM);
         let own = own.map(|face| OwnContact {
             face,
             place: place.point,

@@ -2,6 +2,7 @@
 //! until they follow it, then pulled in and left with the fewest vertices that stay inside. Where a cell of the grid has places outside
 //! between corners that are inside, a grid twice as fine is taken.
 
+use oracle::Surface;
 use rayon::prelude::*;
 use std::collections::HashMap;
 
@@ -9,6 +10,10 @@ use std::collections::HashMap;
 const BISECTIONS: usize = 12;
 /// Halvings of a chord.
 const HALVINGS: u32 = 7;
+/// Bisections of an inset: to a thousandth of it.
+const MOVE_BISECTIONS: usize = 10;
+/// How much farther in (u, v) than by the derivatives a place is moved.
+const FARTHER_MAX: f64 = 64.0;
 /// Most places of the grid.
 const PLACES_MAX: usize = 4_000_000;
 
@@ -33,6 +38,8 @@ pub struct Set<'a> {
     pub rectangle: [[f64; 2]; 2],
     /// Lengths of the derivatives by u and v, mm: at most.
     pub metric: [f64; 2],
+    /// Where the places are in space.
+    pub surface: &'a Surface,
     /// How much closer together the places of the grid are along u and v.
     pub finer: [f64; 2],
     /// Whether a place is in it.
@@ -186,10 +193,17 @@ impl Set<'_> {
                     );
                 }
                 fine.dedup();
-                let pulled = self.pulled_in(&fine, precision.inset_mm);
+                let around_set = self.area(&fine) > 0.0;
+                let mut pulled = self.pulled_in(&fine, precision.inset_mm);
+                if around_set {
+                    // Where the set is narrower than two insets, they went through it and beyond its other side.
+                    pulled.retain(|place| (self.holds)(*place));
+                }
                 let simple = without_spikes(self.simplified(&pulled, precision));
-                (simple.len() > 2 && self.area(&simple).abs() > precision.inset_mm * precision.grid_mm)
-                    .then_some(simple)
+                let area = self.area(&simple);
+                let is_left =
+                    (area > 0.0) == around_set && area.abs() > precision.inset_mm * precision.grid_mm;
+                (simple.len() > 2 && is_left).then_some(simple)
             })
             .collect()
     }
@@ -309,6 +323,36 @@ impl Set<'_> {
         self.chord(found, b, step, chord_mm, left - 1, out);
     }
 
+    /// A place moved by so much of (u, v), as far as that is in space by the derivatives at it, mm: farther where it is less, because they vanish there, nearer
+    /// where it is more. Not beyond the rectangle.
+    fn moved(&self, from: Place, by: Place, length_mm: f64) -> Place {
+        let to = |share: f64| -> Place {
+            std::array::from_fn(|k| {
+                let [low, high] = self.rectangle[k];
+                (from[k] + share * by[k]).clamp(low, high)
+            })
+        };
+        let point = |place: Place| self.surface.at(place[0], place[1]).point;
+        let start = point(from);
+        let is_short = |share: f64| point(to(share)).distance(start) < length_mm;
+        let (mut short, mut long) = (0.0, 1.0);
+        while is_short(long) {
+            (short, long) = (long, 2.0 * long);
+            if long > FARTHER_MAX {
+                return to(1.0);
+            }
+        }
+        for _ in 0..MOVE_BISECTIONS {
+            let middle = 0.5 * (short + long);
+            if is_short(middle) {
+                short = middle;
+            } else {
+                long = middle;
+            }
+        }
+        to(long)
+    }
+
     /// Each vertex moved in, to the left of its edges; those on a side of the rectangle stay on it.
     fn pulled_in(&self, polygon: &[Place], by: f64) -> Vec<Place> {
         let count = polygon.len();
@@ -319,25 +363,20 @@ impl Set<'_> {
                     polygon[index],
                     polygon[(index + 1) % count],
                 );
+                let at = self.surface.at(here[0], here[1]);
+                let metric = [at.u.length(), at.v.length()].map(|length| length.max(f64::MIN_POSITIVE));
                 let unit = |a: Place, b: Place| {
-                    let length = self.length(a, b).max(f64::MIN_POSITIVE);
-                    [
-                        -(b[1] - a[1]) * self.metric[1] / length,
-                        (b[0] - a[0]) * self.metric[0] / length,
-                    ]
+                    let [du, dv] = [0, 1].map(|k| (b[k] - a[k]) * metric[k]);
+                    let length = du.hypot(dv).max(f64::MIN_POSITIVE);
+                    [-dv / length, du / length]
                 };
                 let (m, n) = (unit(before, here), unit(here, after));
                 let sum = [m[0] + n[0], m[1] + n[1]];
                 let share = (by / (0.5 * (sum[0] * sum[0] + sum[1] * sum[1])).max(0.25)).min(2.0 * by);
-                std::array::from_fn(|k| {
-                    let [low, high] = self.rectangle[k];
-                    let on_side = here[k] == low || here[k] == high;
-                    if on_side {
-                        here[k]
-                    } else {
-                        (here[k] + share * sum[k] / self.metric[k]).clamp(low, high)
-                    }
-                })
+                let on_side = [0, 1].map(|k| self.rectangle[k].contains(&here[k]));
+                let inwards = [0, 1].map(|k| if on_side[k] { 0.0 } else { share * sum[k] });
+                let by = [0, 1].map(|k| inwards[k] / metric[k]);
+                self.moved(here, by, inwards[0].hypot(inwards[1]))
             })
             .collect()
     }

@@ -9,8 +9,8 @@ use crate::tool::{Reason, Tool};
 use crate::tree::{Block, Tree};
 use crate::triangle::edge_nearest;
 
-/// Depths below it are not looked for, mm: the error of a distance.
-const FLOOR_MM: f64 = 5e-4;
+/// The error of a distance, mm: depths below it are not looked for.
+pub(crate) const DISTANCE_ERROR_MM: f64 = 5e-4;
 /// Steps of a motion that are looked at between two places, mm.
 const STEP_MM: f64 = 0.1;
 /// Places of the face at which the height of what is left is measured.
@@ -50,12 +50,12 @@ pub fn deepest(part: &Part, tool: &Tool, centres: &[DVec3]) -> Option<Deepest> {
             }
         };
         let number = |face: usize| part.faces[face].face.number;
-        if let Some(near) = part.nearest(*centre, tool.radius - FLOOR_MM, None, false) {
+        if let Some(near) = part.nearest(*centre, tool.radius - DISTANCE_ERROR_MM, None, false) {
             note(Reason::Ball, tool.radius - near.distance, number(near.face));
         }
         for column in &tool.columns {
             let z = column.z.map(|z| centre.z + z);
-            if let Some(near) = part.beside(*centre, z, column.radius - FLOOR_MM, false) {
+            if let Some(near) = part.beside(*centre, z, column.radius - DISTANCE_ERROR_MM, false) {
                 note(column.part, column.radius - near.distance, number(near.face));
             }
         }
@@ -153,7 +153,7 @@ pub fn leftover(
         .par_iter()
         .map(|(uv, _)| {
             clearance.check(*uv).ok()?;
-            let (place, _) = clearance.place(*uv);
+            let place = clearance.place(*uv);
             Some((
                 passes.height(place.point, place.normal, clearance.tool.radius),
                 place.point,

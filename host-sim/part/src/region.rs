@@ -2,6 +2,7 @@
 
 use cad::{Face, Placement, polylines};
 use glam::DVec3;
+use job::Along;
 use oracle::Surface;
 
 use crate::body::Part;
@@ -137,6 +138,7 @@ impl Request<'_> {
             normal_z_min: (90.0 - self.steepest_deg).to_radians().sin(),
             touch_mm: self.touch_mm,
             part: self.part,
+            breaks: [Along::U, Along::V].map(|along| self.surface.breaks(along)),
         }
     }
 
@@ -167,13 +169,13 @@ impl Request<'_> {
                 let (u, v) = (share(0, i), share(1, j));
                 let at = self.surface.at(u, v);
                 metric = [metric[0].max(at.u.length()), metric[1].max(at.v.length())];
-                let (place, fits) = clearance.place([u, v]);
-                if fits {
+                let place = clearance.place([u, v]);
+                if place.fault.is_none() {
                     let [_, most] = at.principal_curvatures(place.normal);
                     let share = (1.0 - r * most).max(1.0 / STEP_MAX / STEP_MAX);
                     step = step.max(plane / share.sqrt());
                     let centre = |uv: [f64; 2]| {
-                        let (place, _) = clearance.place(uv);
+                        let place = clearance.place(uv);
                         place.point + place.normal * r
                     };
                     for (k, of_centre) in of_centre.iter_mut().enumerate() {
@@ -243,6 +245,7 @@ impl Request<'_> {
         let set = Set {
             rectangle,
             metric,
+            surface: self.surface,
             finer: stretch,
             holds: &|place| is_wanted(place) && clearance.check(place).is_ok(),
             is_sure: &|place| clearance.surely(place),

@@ -367,3 +367,151 @@ fn what_is_left_between_passes_is_the_scallop() {
             .is_infinite()
     );
 }
+
+/// A surface of a file that has no edges, and the same as the surface of a job; straight along v, from y = -10 to 10 mm, by poles of a profile in x and z.
+fn extruded(degree: usize, knots: &[f64], profile: &[[f64; 2]]) -> (Face, oracle::Surface) {
+    let knots_v = vec![0.0, 0.0, 1.0, 1.0];
+    let poles = |weight: f64| -> Vec<Vec<[f64; 4]>> {
+        let row = |[x, z]: &[f64; 2]| [-10.0, 10.0].map(|y| [*x, y, *z, weight]).to_vec();
+        profile.iter().map(row).collect()
+    };
+    let spline = cad::SplineSurface {
+        axes: [
+            cad::Axis {
+                degree,
+                knots: knots.to_vec(),
+            },
+            cad::Axis {
+                degree: 1,
+                knots: knots_v.clone(),
+            },
+        ],
+        poles: poles(1.0),
+    };
+    let surface = oracle::Surface::new(&SurfaceSpec::Nurbs(NurbsSpec {
+        degree: [degree, 1],
+        knots_u: knots.to_vec(),
+        knots_v,
+        poles_mm: poles(1.0),
+        rational: false,
+    }));
+    let face = Face {
+        boundary: Boundary::Natural,
+        ..face(1, Surface::Spline(spline), Vec::new(), 1.0)
+    };
+    (face, surface)
+}
+
+#[test]
+fn a_surface_without_edges_is_there_to_its_sides() {
+    let (face, _) = extruded(1, &[0.0, 0.0, 1.0, 1.0], &[[0.0, 0.0], [20.0, 0.0]]);
+    let part = Part::new(&[face]);
+    for x in [0.0, 7.0, 20.0] {
+        for y in [-10.0, 3.0, 10.0] {
+            let place = dvec3(x, y, 0.0);
+            // Away from the surface: above it, and beyond the sides and corners that the place is on.
+            let away = dvec3(x - 10.0, 10.0 * y.trunc(), 0.0).normalize() + DVec3::Z;
+            let point = place + 2.0 * away.normalize();
+            let nearest = dvec3(point.x.clamp(0.0, 20.0), point.y.clamp(-10.0, 10.0), 0.0);
+            let found = part.nearest(point, 5.0, None, false).expect("it is there");
+            assert!(
+                (found.distance - point.distance(nearest)).abs() < 1e-6,
+                "{place}: {found:?}"
+            );
+        }
+    }
+}
+
+/// Beside an edge with a fillet into which the ball does not fit, it fits at each contact, and touches both flanks at r tan(half of the angle) from the edge.
+#[test]
+fn a_ball_keeps_away_from_a_bend_of_its_own_face() {
+    let (radius, angle, blend): (f64, f64, f64) = (4.0, 10.0_f64.to_radians(), 0.05);
+    let along = |by: f64| {
+        if by < 0.0 {
+            [by, 0.0]
+        } else {
+            [by * angle.cos(), by * angle.sin()]
+        }
+    };
+    let (line, bend) = ([-10.0, -7.0, -3.0], [-1.0 / 3.0, 1.0 / 3.0]);
+    let mut profile: Vec<[f64; 2]> = line.iter().map(|by| along(*by)).collect();
+    profile.push(along(-blend));
+    profile.extend(bend.iter().map(|share| along(share * blend)));
+    profile.push(along(blend));
+    profile.extend(line.iter().rev().map(|by| along(-by)));
+    let knots = [
+        0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 3.0, 3.0, 3.0, 3.0,
+    ];
+    let (face, surface) = extruded(3, &knots, &profile);
+    let trimmed = vec![vec![[0.0, 0.0], [3.0, 0.0], [3.0, 1.0], [0.0, 1.0]]];
+    let made = region(
+        &[face],
+        &surface,
+        &trimmed,
+        &Tool::new(radius, &ToolBody::default()),
+    );
+    assert_eq!(made.loops.len(), 2);
+    let from_edge = |place: &[f64; 2]| {
+        let point = surface.at(place[0], place[1]).point;
+        point.x.hypot(point.z)
+    };
+    let wanted = radius * (0.5 * angle).tan();
+    for ring in &made.loops {
+        let least = ring.iter().map(from_edge).fold(f64::INFINITY, f64::min);
+        // Short of the flanks' contacts by the inset of 10 um, and by what a depth of 1 um allows.
+        assert!((least - wanted).abs() < 0.025, "{least}, {wanted}");
+    }
+}
+
+/// x = 20 u^3: the board's normal is not known where u is small, and the region ends 10 um before that, in space.
+#[test]
+fn a_side_at_which_a_derivative_vanishes_is_left_out() {
+    let knots = [0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0];
+    let (face, surface) = extruded(3, &knots, &[[0.0; 2], [0.0; 2], [0.0; 2], [20.0, 0.0]]);
+    let trimmed = vec![vec![[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]];
+    let made = region(&[face], &surface, &trimmed, &Tool::new(3.0, &ToolBody::default()));
+    assert_eq!(made.loops.len(), 1);
+    let (mut least, mut most) = (f64::INFINITY, 0.0_f64);
+    for [u, v] in &made.loops[0] {
+        let x = surface.at(*u, *v).point.x;
+        (least, most) = (least.min(x), most.max(x));
+    }
+    assert!((0.01..0.03).contains(&least), "{least} mm from the side");
+    assert_eq!(most, 20.0);
+    assert!(
+        made.unreachable_mm2
+            .iter()
+            .all(|(why, area)| *why == Reason::Degenerate && *area < 0.1)
+    );
+}
+
+/// A face that narrows to less than two insets: no polygon goes beyond its sides.
+#[test]
+fn where_a_face_is_narrow_its_region_ends() {
+    let surface = flat(-31.0, 31.0, |_, _| 0.0);
+    let narrow = [
+        dvec3(0.0, 0.0, 0.0),
+        dvec3(20.0, -0.03, 0.0),
+        dvec3(20.0, 0.03, 0.0),
+    ];
+    let flat_face = face(1, plane(0.0), vec![polygon(&narrow)], 1.0);
+    let trimmed = vec![narrow.iter().map(|corner| [corner.x, corner.y]).collect()];
+    let made = Request {
+        surface: &surface,
+        trimmed: &trimmed,
+        face: &flat_face,
+        placement: &Placement::IDENTITY,
+        sign: 1.0,
+        tool: &Tool::new(3.0, &ToolBody::default()),
+        scallop_mm: 0.01,
+        steepest_deg: 85.0,
+        touch_mm: 0.002,
+        part: None,
+    }
+    .make();
+    assert!(!made.loops.is_empty());
+    let inside = Inside::new(&trimmed);
+    for place in made.loops.iter().flatten() {
+        assert!(inside.contains(*place), "{place:?}");
+    }
+}

@@ -10,6 +10,8 @@ const STEPS: usize = 4;
 pub enum Reason {
     /// The surface is steeper than allowed, or looks down.
     Steep,
+    /// A derivative of the surface nearly vanishes, or the two are nearly parallel: the board would not know the normal.
+    Degenerate,
     /// The surface is more concave than the ball.
     Fit,
     /// The ball would cut another place of the part.
@@ -22,13 +24,21 @@ pub enum Reason {
 
 impl Reason {
     /// All of them, in the order in which they are looked at.
-    pub const ALL: [Self; 5] = [Self::Steep, Self::Fit, Self::Ball, Self::Shank, Self::Holder];
+    pub const ALL: [Self; 6] = [
+        Self::Steep,
+        Self::Degenerate,
+        Self::Fit,
+        Self::Ball,
+        Self::Shank,
+        Self::Holder,
+    ];
 
     /// In a word.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Steep => "steep",
+            Self::Degenerate => "degenerate",
             Self::Fit => "fit",
             Self::Ball => "ball",
             Self::Shank => "shank",

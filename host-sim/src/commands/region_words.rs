@@ -4,8 +4,12 @@ use job::FaceReach;
 use serde_json::{Value, json};
 
 /// What a rule is about, for each of its names.
-const REASONS: [(&str, &str); 5] = [
+const REASONS: [(&str, &str); 6] = [
     ("steep", "steeper than allowed, or looks down"),
+    (
+        "degenerate",
+        "a derivative nearly vanishes, or the two are nearly parallel",
+    ),
     ("fit", "more concave than the ball"),
     ("ball", "the ball would cut another place of the part"),
     ("shank", "the shank would touch the part"),

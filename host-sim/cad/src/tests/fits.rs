@@ -155,7 +155,7 @@ fn knots_that_the_tolerance_does_not_need_are_left_out() {
     let step = 60.0 / f64::from(PIECES);
     let wave = |k: u32| {
         let x = f64::from(k) * step;
-        ([x, 2.0 * (0.2 * x).sin()], [1.0, 0.4 * (0.2 * x).cos()])
+        ([x, 2.0 * (1.5 * x).sin()], [1.0, 3.0 * (1.5 * x).cos()])
     };
     let mut profile: Vec<[f64; 2]> = Vec::new();
     for k in 0..=PIECES {
@@ -189,7 +189,7 @@ fn knots_that_the_tolerance_does_not_need_are_left_out() {
     assert!(fit::fit(&surface, ranges, 1e-3, Knots::OfSurface).is_err());
     let (fitted, said) = fit::fit(&surface, ranges, 1e-3, Knots::Fewest).unwrap();
     assert!(
-        fitted.patches() < 40 && said.max_mm <= 1e-3,
+        fitted.patches() < 250 && said.max_mm <= 1e-3,
         "{} {said:?}",
         fitted.patches()
     );

@@ -2,6 +2,7 @@
 
 pub(crate) mod fits;
 mod outlines;
+mod removal;
 mod splines;
 mod surfaces;
 
