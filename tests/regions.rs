@@ -263,6 +263,35 @@ fn a_first_pass_that_is_narrowest_at_the_edge_of_its_region() {
     }
 }
 
+/// At the same parameter a pass may be ahead of its neighbour by more than a step-over, and half a step-over from the region's end is farther along it than it is wide.
+#[test]
+fn skew_passes_are_beside_each_other_where_both_are() {
+    for degrees in [25.0_f64, 60.0, 155.0] {
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        let pole = |along: f64, across: f64| [along + across * cos, across * sin, 0.0, 1.0];
+        let mut job = load("plate_machine");
+        job.surface = SurfaceSpec::Nurbs(NurbsSpec {
+            degree: [1, 1],
+            knots_u: vec![0.0, 0.0, 1.0, 1.0],
+            knots_v: vec![0.0, 0.0, 1.0, 1.0],
+            poles_mm: [30.0, 60.0]
+                .map(|along| [5.0, 15.0].map(|across| pole(along, across)).to_vec())
+                .to_vec(),
+            rational: false,
+        });
+        (job.along, job.radius_mm, job.machine.travel_mm) = (Along::U, 3.0, None);
+        job.machine.limits = Some(AxisLimits::DEFAULT);
+        for [low, high] in [[0.6, 0.95], [0.95, 0.6], [0.8, 0.8]] {
+            let corners = vec![[0.1, 0.0], [low, 0.0], [high, 1.0], [0.3, 1.0]];
+            job.region = Some(Region::new(vec![corners]));
+            let followed = follow(&job);
+            let requirements = Requirements::default();
+            let swept = measure(&job, &followed.oracle, &followed.track, true, &requirements, &());
+            assert_eq!(swept.failures, Vec::<String>::new(), "{degrees}, {low}, {high}");
+        }
+    }
+}
+
 /// Links with heights of their own leave the passes as they are; each rises to its height, and no farther than a hop of its length gains by; within the limits, in less time.
 #[test]
 fn a_link_rises_to_its_height() {

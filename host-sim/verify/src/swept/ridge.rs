@@ -533,22 +533,31 @@ impl<'a> Gap<'a> {
     }
 }
 
-/// Range of the path parameter where two passes of a region are beside each other, without the ends that are no boundary of the surface.
+/// Range of the path parameter where two passes of a region are beside each other, without the ends that are no boundary of the surface: at the same parameter one
+/// pass may be ahead of the other.
 fn beside(oracle: &Oracle, passes: [&PassHeight<'_>; 2]) -> Option<[f64; 2]> {
-    let [[a, b], [c, d]] = [passes[0].pass().path_range()?, passes[1].pass().path_range()?];
-    let side = 0.5 * (passes[0].pass().side + passes[1].pass().side);
+    let ends = [passes[0].pass().path_range()?, passes[1].pass().path_range()?];
+    let sides = passes.map(|pass| pass.pass().side);
+    let side = 0.5 * (sides[0] + sides[1]);
     let boundaries = oracle.path_range();
-    let inwards = |at: f64| {
+    // `of`: which pass ends there; `sign`: 1 where it ends, -1 where it starts.
+    let inwards = |of: usize, sign: f64| {
+        let at = ends[of][usize::from(sign > 0.0)];
         if boundaries.contains(&at) {
-            return 0.0;
+            return at;
         }
         let (u, v) = oracle.swapped(at, side);
-        let contact = oracle.contact(u, v).ok();
-        let half = contact.map(|contact| 0.5 * contact.step_over_mm / contact.path_speed);
-        half.filter(|half| half.is_finite()).unwrap_or(0.0)
+        let by = oracle.contact(u, v).ok().map(|contact| {
+            let surface = oracle.surface.at(u, v);
+            let ahead = surface.u.dot(surface.v) / contact.path_speed * (sides[1 - of] - sides[of]);
+            (0.5 * contact.step_over_mm + (sign * ahead).max(0.0)) / contact.path_speed
+        });
+        at - sign * by.filter(|by| by.is_finite()).unwrap_or(0.0)
     };
-    let (low, high) = (a.max(c), b.min(d));
-    let range = [low + inwards(low), high - inwards(high)];
+    let range = [
+        inwards(0, -1.0).max(inwards(1, -1.0)),
+        inwards(0, 1.0).min(inwards(1, 1.0)),
+    ];
     // Where the region ends between them, the lines are not neighbours.
     let is_inside = |[from, to]: &[f64; 2]| *from < range[1] && range[0] < *to;
     (range[0] < range[1] && oracle.intervals(side).iter().any(is_inside)).then_some(range)
