@@ -14,6 +14,7 @@
 //!
 //! Not in the sample path: f64; lengths in mm, angles in rad.
 
+mod aspect;
 mod crossings;
 mod curve;
 mod edges;

@@ -1,5 +1,6 @@
 //! Conversion of a face to the surface of a job: exact up to the degree of the core, otherwise fitted within a tolerance.
 
+use super::aspect::with_even_patches;
 use super::edges::along_edges;
 use super::exact::exact;
 use super::fit::{Deviation, FitError, Knots, deviation, fit};
@@ -274,9 +275,7 @@ fn converted(
         let spline = without_needless_knots(&spline);
         let degree = spline.axes.iter().map(|axis| axis.degree).max().unwrap_or(0);
         if degree <= DEGREE_EXACT {
-            let nurbs = nurbs(&spline);
-            let surface = centred(&nurbs);
-            let exact = |patches| MachinableFace {
+            let exact = |nurbs: NurbsSpec, patches| MachinableFace {
                 nurbs,
                 form: Form::Exact,
                 outline: outline.clone(),
@@ -285,11 +284,18 @@ fn converted(
                 by_edges: false,
                 parameters: options.parameters,
             };
-            match patch_count(&surface) {
-                Ok(patches) => return Ok(exact(patches)),
-                Err(why) => {
-                    why_fitted = why;
-                    streamed = streamed_patch_count(&surface).ok().map(exact);
+            // Even patches where there is room for them.
+            for spline in [with_even_patches(&spline), spline] {
+                let nurbs = nurbs(&spline);
+                let surface = centred(&nurbs);
+                match patch_count(&surface) {
+                    Ok(patches) => return Ok(exact(nurbs, patches)),
+                    Err(why) => {
+                        why_fitted = why;
+                        streamed = streamed_patch_count(&surface)
+                            .ok()
+                            .map(|patches| exact(nurbs, patches));
+                    }
                 }
             }
         } else {

@@ -1,5 +1,6 @@
 //! Tests of the geometry against closed forms, one module a subject; here are the surfaces and faces that they share.
 
+mod aspect;
 pub(crate) mod fits;
 mod outlines;
 mod removal;
