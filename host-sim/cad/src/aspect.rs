@@ -4,19 +4,25 @@ use super::spline::{Axis, Pole, SplineSurface, insert, transposed};
 
 /// Most that a patch may be longer than wide: at 225 the normal on a rational one was 3e-6 rad off.
 const ASPECT_MAX: f64 = 64.0;
+/// Most patches that are made: the board's store holds fewer, and a sliver would need millions.
+const PATCHES_MAX: usize = 512;
 /// Places of a patch, along and across, at which it is measured.
 const SHARES: [f64; 3] = [0.02, 0.5, 0.98];
 
-/// The same surface with knots between which no patch is much longer than wide; the poles are those of the same shape. Sides that shrink to a point are left out.
+/// The same surface with knots between which no patch is much longer than wide; `None` where none is, or where that would take too many.
 #[must_use]
-pub(super) fn with_even_patches(spline: &SplineSurface) -> SplineSurface {
-    let knots = [0, 1].map(|k| dividing(spline, k));
+pub(super) fn with_even_patches(spline: &SplineSurface) -> Option<SplineSurface> {
+    let knots = [dividing(spline, 0)?, dividing(spline, 1)?];
+    let spans = |k: usize| spline.axes[k].breaks().len() - 1 + knots[k].len();
+    if knots.iter().all(Vec::is_empty) || spans(0) * spans(1) > PATCHES_MAX {
+        return None;
+    }
     let (axis_u, rows) = divided(&spline.axes[0], &spline.poles, &knots[0]);
     let (axis_v, columns) = divided(&spline.axes[1], &transposed(&rows), &knots[1]);
-    SplineSurface {
+    Some(SplineSurface {
         axes: [axis_u, axis_v],
         poles: transposed(&columns),
-    }
+    })
 }
 
 fn divided(axis: &Axis, rows: &[Vec<Pole>], knots: &[f64]) -> (Axis, Vec<Vec<Pole>>) {
@@ -27,8 +33,8 @@ fn divided(axis: &Axis, rows: &[Vec<Pole>], knots: &[f64]) -> (Axis, Vec<Vec<Pol
     (axis, rows)
 }
 
-/// Knots that divide the patches that are too long along one parameter.
-fn dividing(spline: &SplineSurface, k: usize) -> Vec<f64> {
+/// Knots that divide the patches that are too long along one parameter; `None` if there are too many.
+fn dividing(spline: &SplineSurface, k: usize) -> Option<Vec<f64>> {
     let (along, across) = (spline.axes[k].breaks(), spline.axes[1 - k].breaks());
     let mut knots = Vec::new();
     for span in along.windows(2) {
@@ -41,12 +47,13 @@ fn dividing(spline: &SplineSurface, k: usize) -> Vec<f64> {
             clippy::cast_sign_loss,
             reason = "positive; the cast saturates"
         )]
-        let parts = (aspect / ASPECT_MAX).ceil() as u32;
-        knots.extend(
-            (1..parts).map(|part| span[0] + (span[1] - span[0]) * f64::from(part) / f64::from(parts)),
-        );
+        let parts = (aspect / ASPECT_MAX).ceil() as usize;
+        if parts > PATCHES_MAX {
+            return None;
+        }
+        knots.extend((1..parts).map(|part| span[0] + (span[1] - span[0]) * part as f64 / parts as f64));
     }
-    knots
+    Some(knots)
 }
 
 /// How much longer along parameter k than wide a patch is, where it is widest.

@@ -285,7 +285,7 @@ fn converted(
                 parameters: options.parameters,
             };
             // Even patches where there is room for them.
-            for spline in [with_even_patches(&spline), spline] {
+            for spline in with_even_patches(&spline).into_iter().chain([spline]) {
                 let nurbs = nurbs(&spline);
                 let surface = centred(&nurbs);
                 match patch_count(&surface) {

@@ -20,7 +20,7 @@ use super::{Boundary, Face, Outline};
 /// Distance of a curve from the edge that it follows, mm: less than half of an edge's on an iso-parametric line.
 const FOLLOWS_MM: f64 = 4e-4;
 /// Least sine of the angle between the derivatives: closer together, the normal loses digits and steps of passes shrink.
-const SINE_MIN: f64 = 0.5;
+const SINE_MIN: f64 = 0.25;
 /// Least derivative, as a share of the longest one: what is less is nearly a point.
 const SLOWEST: f64 = 0.02;
 /// Places a side of each patch at which the derivatives are looked at.
