@@ -263,6 +263,41 @@ fn a_first_pass_that_is_narrowest_at_the_edge_of_its_region() {
     }
 }
 
+/// The first pass of a part of the region that no step leads to: the last step of the part before it says nothing of the step from it. On a plane whose lines are farthest apart
+/// halfway across, with a part at its edge and another one farther on: in a cell of its own, or in one whose lines meet both.
+#[test]
+fn a_part_of_a_region_begins_with_a_step_of_its_own() {
+    let row = |x: f64| vec![[x, 0.0, 0.0, 1.0], [x, 4.0, 0.0, 0.4], [x, 8.0, 0.0, 1.0]];
+    let mut job = load("plate_machine");
+    job.surface = SurfaceSpec::Nurbs(NurbsSpec {
+        degree: [1, 2],
+        knots_u: vec![0.0, 0.0, 1.0, 1.0],
+        knots_v: vec![0.0, 0.0, 0.0, 1.0, 1.0, 1.0],
+        poles_mm: vec![row(5.0), row(60.0)],
+        rational: true,
+    });
+    (job.along, job.radius_mm, job.machine.travel_mm) = (Along::U, 3.0, None);
+    let part = |[left, right]: [f64; 2], [low, high]: [f64; 2]| {
+        vec![[left, low], [right, low], [right, high], [left, high]]
+    };
+    for limits in [None, Some(AxisLimits::DEFAULT)] {
+        for second in [[0.0, 0.3], [0.6, 0.9]] {
+            for start in [0.3, 0.5, 0.6] {
+                job.machine.limits = limits;
+                job.region = Some(Region::new(vec![
+                    part([0.0, 0.3], [0.0, 0.1]),
+                    part(second, [start, 1.0]),
+                ]));
+                let followed = follow(&job);
+                let requirements = Requirements::default();
+                let swept = measure(&job, &followed.oracle, &followed.track, true, &requirements, &());
+                let about = format!("{}, {second:?}, {start}", limits.is_some());
+                assert_eq!(swept.failures, Vec::<String>::new(), "{about}");
+            }
+        }
+    }
+}
+
 /// At the same parameter a pass may be ahead of its neighbour by more than a step-over, and half a step-over from the region's end is farther along it than it is wide.
 #[test]
 fn skew_passes_are_beside_each_other_where_both_are() {

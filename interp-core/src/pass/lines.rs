@@ -40,6 +40,8 @@ pub(crate) struct RegionLines {
     is_seeking: bool,
     /// The job has a region.
     is_in_use: bool,
+    /// The line is not one step beyond the one before: it begins a cell, or the region again, or lines between were skipped.
+    is_apart: bool,
     /// The last step-over, units of the side parameter.
     step: f32,
 }
@@ -53,12 +55,14 @@ impl RegionLines {
         cell: 0,
         is_seeking: false,
         is_in_use: false,
+        is_apart: true,
         step: 0.0,
     };
 
     /// Resets to the first line of a job with a region. Curved passes are found elsewhere.
     pub(crate) fn restart(&mut self, job: &Job<'_>, first: &FirstLine) {
         self.is_in_use = false;
+        self.is_apart = true;
         self.reversed = false;
         self.done = 0;
         self.cell = 0;
@@ -84,6 +88,11 @@ impl RegionLines {
     /// Whether the job has a region.
     pub(crate) const fn is_in_use(&self) -> bool {
         self.is_in_use
+    }
+
+    /// Whether the pass taken last is the first one on a line that is not one step beyond the line before: the step to it says nothing of the step from it.
+    pub(crate) const fn begins_apart(&self) -> bool {
+        self.is_in_use && self.is_apart && self.done == 1
     }
 
     /// Whether no interval is left on the line, and the next one is not sought yet.
@@ -229,11 +238,15 @@ impl RegionLines {
             return Ok(false);
         };
         let side = self.line.side();
+        self.is_apart = rows.is_none();
         if side >= cell.last() {
             return Ok(self.next_cell(job, &cell));
         }
         let next = match self.line.begins_again(&cell) {
-            Some(next) => next.max(side + 1),
+            Some(next) => {
+                self.is_apart = true;
+                next.max(side + 1)
+            }
             None => {
                 let width = |span| job.side_width(span);
                 let from = place_from(side);
@@ -267,6 +280,7 @@ impl RegionLines {
             return false;
         };
         self.cell = next;
+        self.is_apart = true;
         self.line.begin(cell.first(), i32::MIN);
         true
     }

@@ -593,6 +593,9 @@ impl Run {
             // With limits the estimator is the look-ahead's.
             if job.header.axes.is_none() {
                 scan.estimator().enter_row(job.header, route.side.span, false);
+                if self.lines.begins_apart() {
+                    scan.estimator().begin_apart();
+                }
             }
             scan.begin(&route, goes_on);
         }

@@ -119,6 +119,12 @@ impl StepOverEstimator {
         self.rows.enter(header, row, is_turned);
     }
 
+    /// The pass that is looked at from here on does not follow the one before by a step: its lines have no previous step to be placed by.
+    pub(crate) const fn begin_apart(&mut self) {
+        self.before = None;
+        self.looked_again = false;
+    }
+
     /// Rows of the last passes.
     pub(crate) const fn rows(&self) -> &RowHistory {
         &self.rows
@@ -197,7 +203,7 @@ impl StepOverEstimator {
         self.own.most
     }
 
-    /// Whether the first pass is not followed yet: the lines then have no previous step to be placed by.
+    /// Whether the first pass of a job, or of a part of its region, is not followed yet: the lines then have no previous step to be placed by.
     pub(crate) const fn is_first(&self) -> bool {
         self.before.is_none()
     }

@@ -360,8 +360,11 @@ impl Sequencer {
                     // It begins at rest, wherever the pass before it would have led.
                     now.tail = Turn::NONE;
                 }
-                if let (Some(estimator), _) = run.estimator_and_lines() {
+                if let (Some(estimator), lines) = run.estimator_and_lines() {
                     estimator.enter_row(job.header, next.route.side.span, now.tail.exists());
+                    if lines.begins_apart() {
+                        estimator.begin_apart();
+                    }
                 }
                 self.lookahead.begin(pass, next.route, &now.tail, next);
                 next.is_last = run.is_last_pass();
