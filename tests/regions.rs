@@ -137,8 +137,10 @@ fn random_regions() {
         passes += followed.findings.passes;
         let scanned = followed.oracle.schedule().unwrap().len();
         let apart = scanned.abs_diff(followed.findings.passes as usize);
+        // One line more has as many passes as intervals.
+        let of_a_line = job.region.as_ref().map_or(0, |region| region.loops.len());
         assert!(
-            apart <= 2 + scanned / 30,
+            apart <= of_a_line.max(2) + scanned / 30,
             "{about}: {} passes, {scanned} by the scan",
             followed.findings.passes
         );
