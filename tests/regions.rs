@@ -329,6 +329,45 @@ fn skew_passes_are_beside_each_other_where_both_are() {
     }
 }
 
+/// Lines one after the other are no neighbours where they are in two cells. The part that is left for later is narrower than both.
+#[test]
+fn a_cell_that_is_left_for_later_is_no_gap() {
+    let row = |x: f64| vec![[x, 0.0, 0.0, 1.0], [x, 40.0, 0.0, 1.0]];
+    let mut job = load("plate_machine");
+    job.surface = SurfaceSpec::Nurbs(NurbsSpec {
+        degree: [1, 1],
+        knots_u: vec![0.0, 0.0, 1.0, 1.0],
+        knots_v: vec![0.0, 0.0, 1.0, 1.0],
+        poles_mm: vec![row(5.0), row(60.0)],
+        rational: false,
+    });
+    (job.along, job.radius_mm, job.machine.travel_mm) = (Along::U, 3.0, None);
+    let part = |left: f64, low: f64, high: f64| vec![[left, low], [0.6, low], [0.6, high], [left, high]];
+    let drawn = vec![
+        [0.2, 0.1],
+        [0.6, 0.1],
+        [0.6, 0.9],
+        [0.2, 0.9],
+        [0.2, 0.7],
+        [0.4, 0.7],
+        [0.4, 0.3],
+        [0.2, 0.3],
+    ];
+    job.region = Some(Region {
+        cells: vec![
+            vec![part(0.2, 0.1, 0.3)],
+            vec![part(0.2, 0.7, 0.9)],
+            vec![part(0.4, 0.3, 0.7)],
+        ],
+        ..Region::new(vec![drawn])
+    });
+    let followed = follow(&job);
+    let requirements = Requirements::default();
+    let swept = measure(&job, &followed.oracle, &followed.track, true, &requirements, &());
+    assert_eq!(swept.failures, Vec::<String>::new());
+    assert_eq!(swept.ridges.len() + 3, followed.track.passes.len());
+}
+
 /// Links with heights of their own leave the passes as they are; each rises to its height, and no farther than a hop of its length gains by; within the limits, in less time.
 #[test]
 fn a_link_rises_to_its_height() {

@@ -106,6 +106,27 @@ impl RegionEdges {
         })
     }
 
+    /// Intervals of a line, ascending.
+    fn intervals(&self, side: f64) -> Vec<[f64; 2]> {
+        // The line on the upper boundary is the one below it.
+        let [least, most] = self.extent();
+        // A line on the lower boundary may be rounded to a place below it.
+        let side = if side < least && least - side <= self.near_side() {
+            least
+        } else {
+            side
+        };
+        let side = side.min(most - 1e-3 * self.place[1]);
+        let mut intervals: Vec<[f64; 2]> = Vec::new();
+        for pair in self.crossings(side).as_chunks::<2>().0 {
+            match intervals.last_mut() {
+                Some([_, end]) if pair[0] - *end <= 0.0 => *end = pair[1],
+                _ => intervals.push(*pair),
+            }
+        }
+        intervals
+    }
+
     /// Side parameters of the vertices.
     fn sides(&self) -> Vec<f64> {
         let mut sides: Vec<f64> = self.edges.iter().map(|[from, _]| from[1]).collect();
@@ -296,26 +317,27 @@ impl Oracle {
     /// Intervals of a line that lie in the region, ascending; the whole line where the job has none.
     #[must_use]
     pub fn intervals(&self, side: f64) -> Vec<[f64; 2]> {
-        let Some(region) = &self.region else {
-            return vec![self.path_range()];
-        };
-        // The line on the upper boundary is the one below it.
-        let [least, most] = region.extent();
-        // A line on the lower boundary may be rounded to a place below it.
-        let side = if side < least && least - side <= region.near_side() {
-            least
-        } else {
-            side
-        };
-        let side = side.min(most - 1e-3 * region.place[1]);
-        let mut intervals: Vec<[f64; 2]> = Vec::new();
-        for pair in region.crossings(side).as_chunks::<2>().0 {
-            match intervals.last_mut() {
-                Some([_, end]) if pair[0] - *end <= 0.0 => *end = pair[1],
-                _ => intervals.push(*pair),
-            }
+        match &self.region {
+            Some(region) => region.intervals(side),
+            None => vec![self.path_range()],
         }
-        intervals
+    }
+
+    /// Whether two passes, each by its side parameter and its range of the path parameter, are in one cell of the region, which is between them somewhere in a range, too.
+    #[must_use]
+    pub fn are_in_one_cell(&self, passes: [(f64, [f64; 2]); 2], [from, to]: [f64; 2]) -> bool {
+        let [(near, _), (far, _)] = passes;
+        let is_between = |[start, end]: &[f64; 2]| *start < to && from < *end;
+        self.cells.iter().any(|cell| {
+            let [_, most] = cell.extent();
+            let holds = |(side, [from, to]): &(f64, [f64; 2])| {
+                // But for the rounding of its ends.
+                let is_of_pass =
+                    |[start, end]: &[f64; 2]| to.min(*end) - from.max(*start) >= 0.99 * (to - from);
+                *side <= most + cell.near_side() && cell.intervals(*side).iter().any(is_of_pass)
+            };
+            passes.iter().all(holds) && cell.intervals(0.5 * (near + far)).iter().any(is_between)
+        })
     }
 
     /// Length of an interval, mm.

@@ -558,9 +558,9 @@ fn beside(oracle: &Oracle, passes: [&PassHeight<'_>; 2]) -> Option<[f64; 2]> {
         inwards(0, -1.0).max(inwards(1, -1.0)),
         inwards(0, 1.0).min(inwards(1, 1.0)),
     ];
-    // Where the region ends between them, the lines are not neighbours.
-    let is_inside = |[from, to]: &[f64; 2]| *from < range[1] && range[0] < *to;
-    (range[0] < range[1] && oracle.intervals(side).iter().any(is_inside)).then_some(range)
+    // Where the region, or the cell, ends between them, the lines are not neighbours.
+    let of_passes = [(sides[0], ends[0]), (sides[1], ends[1])];
+    (range[0] < range[1] && oracle.are_in_one_cell(of_passes, range)).then_some(range)
 }
 
 fn highest(crests: &[Crest]) -> f64 {
