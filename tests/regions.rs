@@ -1,5 +1,6 @@
 //! Jobs with a region: passes end at its boundary, none is left out, and the scallop height is within its limit between them.
 
+mod commands;
 mod curved;
 
 use std::path::PathBuf;

@@ -4,10 +4,11 @@ use crate::motion::Uses;
 use crate::scaled_dome;
 use interp_core::{
     AxisLimits, Command, Header, Inputs, Interpolator, Pattern, Sample, Spacing, SpanParameter, State,
+    front_words,
 };
 use job::AxisLimits as JobLimits;
 use machine::links::Link;
-use machine::prepare::prepare;
+use machine::prepare::{Prepared, prepare};
 
 /// The core, with a store of the job's size.
 pub type Core = Interpolator<Vec<i32>>;
@@ -20,8 +21,6 @@ const APPROACHES: usize = 4;
 /// Periods after the last command within which a run has ended, and equal samples in contact that are none of a stand.
 const ENDS: usize = 60_000;
 const STANDS: u32 = 4;
-/// Words of the store behind a job with curved passes.
-const FRONTS: usize = 6000;
 /// Override below which a tool that moves may seem to stand, %.
 const SLOW: u8 = 20;
 /// Periods in which the feed follows a lower override.
@@ -56,7 +55,7 @@ impl Random {
 #[must_use]
 pub fn loaded(header: &Header, words: &[i32]) -> Core {
     // Fronts lie behind the job.
-    let spare = if header.spacing.is_constant() { FRONTS } else { 0 };
+    let spare = front_words(header).unwrap_or(0);
     let mut core = Interpolator::with_store(vec![0; words.len() + spare]);
     core.load_begin(header, u32::try_from(words.len()).unwrap())
         .unwrap();
@@ -135,6 +134,12 @@ impl Course {
         }
     }
 
+    /// A job with limits of three passes or more.
+    #[must_use]
+    pub fn of(name: &str, prepared: &Prepared) -> Self {
+        Self::new(name, prepared.header, &prepared.words)
+    }
+
     /// A sample job at a feed, mm/min, with limits.
     fn of_job(name: &str, feed_mm_min: f64, pattern: job::Pattern, overrun_mm: f64) -> Self {
         let jobs = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../jobs");
@@ -149,7 +154,7 @@ impl Course {
         });
         let prepared = prepare(&job).unwrap();
         let what = format!("{name} {feed_mm_min} {pattern:?} {overrun_mm}");
-        Self::new(&what, prepared.header, &prepared.words)
+        Self::of(&what, &prepared)
     }
 
     /// A dome of 10 mm x 7.5 mm, at this feed, mm/s.
@@ -200,7 +205,7 @@ impl Course {
         let mut prepared = prepare(&job_file::parse("region.toml", &text).unwrap()).unwrap();
         machine::links::add(&mut prepared, &[Link::Straight; 100]);
         let name = format!("region of {patches} patches");
-        Self::new(&name, prepared.header, &prepared.words)
+        Self::of(&name, &prepared)
     }
 
     /// After slivers comes a pass that takes longer to plan, for which the tool waits above the end of the last of them.

@@ -50,6 +50,9 @@ pub(crate) const CELL_MIN_MM: f32 = 0.15;
 pub(crate) const CELL_FINE_MM: f32 = 0.25;
 pub(crate) const CELLS_FINE: u16 = 4;
 
+/// Length of a cell, mm, above which its derivatives are not straight from end to end: those of a pass whose patches are longer than those of the last one.
+const LONG_MM: f32 = 0.6;
+
 /// Most cells that derivatives are taken over for one between stations.
 pub(crate) const PARTS_MAX: u16 = 32;
 
@@ -195,16 +198,31 @@ impl Stations {
         crate::math::number::to_f32(arc_q10 - from) * MM_PER_Q10
     }
 
-    /// Derivatives at a fraction of a cell.
+    /// Derivatives at a fraction of a cell: straight; the first one of a long cell with the second ones at both ends (Hermite), where these are the places' own.
     pub(crate) fn blend(&self, cell: u16, part: f32) -> Derivatives {
-        let mut q = self.get(cell).q;
-        let next = &self.get((cell + 1).min(self.count.saturating_sub(1))).q;
-        for (q, next) in q.iter_mut().zip(next) {
-            for (q, next) in q.iter_mut().zip(next) {
-                *q += part * (*next - *q);
+        let from = &self.get(cell).q;
+        let to = &self.get((cell + 1).min(self.count.saturating_sub(1))).q;
+        let mut q = *from;
+        for (q, to) in q.iter_mut().zip(to) {
+            for (q, to) in q.iter_mut().zip(to) {
+                *q += part * (*to - *q);
+            }
+        }
+        let length = self.cell_mm(cell);
+        if length > LONG_MM && !self.is_of_groups() {
+            let rest = 1.0 - part;
+            for (([q, ..], [first, second, _]), [to_first, to_second, _]) in q.iter_mut().zip(from).zip(to) {
+                let rise = to_first - first;
+                let bow = rest * (length * second - rise) - part * (length * to_second - rise);
+                *q += part * rest * bow;
             }
         }
         q
+    }
+
+    /// Whether a station stands for a group of patches, with their greatest derivatives.
+    const fn is_of_groups(&self) -> bool {
+        self.cells > 0 && self.group > 1
     }
 }
 

@@ -13,6 +13,9 @@ use crate::math::number::Bounded;
 const JUMP_REACH: f32 = 1.2;
 const JUMP_BEYOND: f32 = 0.8;
 
+/// Least c that the change of the jerk is divided by.
+const C_MIN: f32 = 1e-6;
+
 /// Intervals before a place from which a jump near it is sought, and places that are looked at.
 const KNOT_NEAR: u16 = 2;
 const KNOTS_NEAR: usize = 8;
@@ -105,34 +108,38 @@ impl Plan {
         let interval = self.interval_of(pace, cursor.interval);
         let x = cursor.x.at_most(1.0);
         let inverse = self.inverse_step;
-        let [s1, s2, s3] = interval.walk_rates(x);
-        let [c, c1, c2] = interval.pace_rates(x);
+        let [walk, rates] = [interval.walk_rates(x), interval.pace_rates(x)];
+        let [s1, s2, _] = walk;
+        let [c, c1, _] = rates;
         let root = sqrt(c.at_least(0.0)) * inverse;
-        let square = inverse * inverse;
         let v = s1 * root;
-        let a = (s2 * c + 0.5 * s1 * c1) * square;
-        let j = root * square * (s3 * c + 1.5 * s2 * c1 + 0.5 * s1 * c2);
-        // The jerk steps at a node: where the place stands for some time around it, both sides count.
-        let reach = 2.0 * around * root * r;
-        let beside = if x + reach > 1.0 && cursor.interval + 1 < self.intervals {
-            Some(self.interval_of(pace, cursor.interval + 1))
-        } else if x < reach && cursor.interval > 0 {
-            Some(self.interval_of(pace, cursor.interval - 1))
-        } else {
-            None
-        };
-        let j_beside = beside.map_or(j, |beside| {
-            let [_, _, s3] = beside.walk_rates(0.0);
-            let [_, _, c2] = beside.pace_rates(0.0);
-            root * square * (s3 * c + 1.5 * s2 * c1 + 0.5 * s1 * c2)
-        });
+        let a = (s2 * c + 0.5 * s1 * c1) * inverse * inverse;
+        let [j, change] = jerk(walk, rates, inverse);
+        let [mut least, mut most] = [j, j];
+        if around > 0.0 {
+            // The jerk changes along an interval and steps at a node: all of the time that the place stands for counts.
+            let within = around * root * r;
+            let mut add = |j: f32| (least, most) = (least.at_most(j), most.at_least(j));
+            add(j - change * within.at_most(x));
+            add(j + change * within.at_most(1.0 - x));
+            let beside = if x + 2.0 * within > 1.0 && cursor.interval + 1 < self.intervals {
+                Some((cursor.interval + 1, 0.0, (x + within - 1.0).at_least(0.0)))
+            } else if x < 2.0 * within && cursor.interval > 0 {
+                Some((cursor.interval - 1, 1.0, (x - within).at_most(0.0)))
+            } else {
+                None
+            };
+            if let Some((index, node, beyond)) = beside {
+                let beside = self.interval_of(pace, index);
+                let [j, change] = jerk(beside.walk_rates(node), beside.pace_rates(node), inverse);
+                add(j);
+                add(j + beyond * change);
+            }
+        }
         // Near the feed the tool moves at exactly that, and the plan's own jerk may help nothing.
         let is_near = (v - self.limits.feed).abs() < self.change.near;
         let exact = if is_near { 0.0 } else { j };
-        let j = [
-            j.at_most(j_beside).at_most(exact),
-            j.at_least(j_beside).at_least(exact),
-        ];
+        let j = [least.at_most(exact), most.at_least(exact)];
         let arc_q10 = cursor.start_q10 + to_q10(interval.arc(x));
         let [from, _] = self.node(cursor.interval);
         let [to, _] = self.node(cursor.interval + 1);
@@ -184,9 +191,18 @@ impl Plan {
     }
 }
 
+/// The jerk at a place, mm/s^3, and its change by k within the interval, from S', S'', S''' and c, c', c'' there.
+#[inline(always)]
+fn jerk([s1, s2, s3]: [f32; 3], [c, c1, c2]: [f32; 3], inverse: f32) -> [f32; 2] {
+    let scale = sqrt(c.at_least(0.0)) * inverse * inverse * inverse;
+    let jerk = scale * (s3 * c + 1.5 * s2 * c1 + 0.5 * s1 * c2);
+    let of_root = 0.5 * c1 / c.at_least(C_MIN);
+    [jerk, scale * (2.5 * s3 * c1 + 2.0 * s2 * c2) + of_root * jerk]
+}
+
 /// The motion of a plan at a place.
 struct MotionAt {
-    /// mm/s, mm/s^2; least and greatest jerk on either side of a node nearby, mm/s^3.
+    /// mm/s, mm/s^2; least and greatest jerk around the place, mm/s^3.
     v: f32,
     a: f32,
     j: [f32; 2],
@@ -199,7 +215,7 @@ struct MotionAt {
 /// The motion of an axis at a place.
 struct AxisAt<'a> {
     slope: f32,
-    /// mm/s^2, and mm/s^3 on either side of a node nearby.
+    /// mm/s^2, and the least and the greatest around the place, mm/s^3.
     acceleration: f32,
     jerk: [f32; 2],
     /// Jerk of a jump nearby, as a fraction of the limit.

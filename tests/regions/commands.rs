@@ -1,0 +1,77 @@
+//! Random sequences of operator commands on passes within random regions.
+
+use integration_tests::sequences::{Course, Outcome, run_all};
+use job::{AxisLimits, Side};
+use machine::Machine;
+use machine::links::{self, Link};
+use machine::prepare::prepare;
+
+use super::{random_job, seeds};
+
+/// Sequences on each job.
+const EACH: u64 = 30;
+/// Most links of a job that are straight; half of the jobs have none.
+const LINKS: usize = 100;
+/// Fewest passes of a job that is run.
+const PASSES: u32 = 3;
+
+/// The job of a random region with axis limits, and its undisturbed run. None of a region that holds no pass, or few, and of a run that ends in a fault.
+fn course(seed: u64, is_curved: bool) -> Option<Course> {
+    let mut job = random_job(seed, is_curved);
+    (job.machine.limits, job.side) = (Some(AxisLimits::DEFAULT), Side::Up);
+    let (job, _) = machine::direction::choose(job).ok()?;
+    let mut prepared = prepare(&job).unwrap();
+    if (seed / 2).is_multiple_of(2) {
+        links::add(&mut prepared, &[Link::Straight; LINKS]);
+    }
+    let mut machine = Machine::load(&prepared).unwrap();
+    let mut pass = 0;
+    let end = machine.run(|sample| {
+        pass = sample.pass;
+        true
+    });
+    if let Err(fault) = end {
+        println!("seed {seed}: {fault:?}");
+    }
+    (end.is_ok() && pass >= PASSES)
+        .then(|| Course::of(&format!("region {seed} {:?}", job.spacing), &prepared))
+}
+
+/// Limits are kept, each pass ends where it does without commands, and each run comes to its end.
+fn run_sequences(is_curved: bool) {
+    let (mut all, mut errors) = (Outcome::default(), Vec::new());
+    let seeds = seeds(8);
+    let least = (seeds.end - seeds.start) * EACH / 2;
+    for seed in seeds {
+        let Some(course) = course(seed, is_curved) else {
+            continue;
+        };
+        let (outcome, broken) = run_all(&[course], seed * EACH..(seed + 1) * EACH);
+        println!("seed {seed}: {outcome:?}");
+        all.add(&outcome);
+        errors.extend(broken);
+    }
+    println!("{all:?}");
+    assert!(errors.is_empty(), "{errors:#?}");
+    assert!(all.count as u64 >= least, "{} sequences", all.count);
+}
+
+#[test]
+fn no_sequence_breaks_a_limit_on_curved_passes() {
+    run_sequences(true);
+}
+
+#[test]
+fn no_sequence_breaks_a_limit_on_straight_passes() {
+    run_sequences(false);
+}
+
+/// Changes of the pace where the plan's own jerk changes by its whole limit within an interval of the plan: what held in the middle of a slot used up to 1.064 of the limit at its start.
+#[test]
+fn a_pace_that_changes_where_the_jerk_does() {
+    for (region, sequence) in [(239, 7185), (418, 12546), (502, 15076), (518, 15567)] {
+        let course = course(region, true).unwrap();
+        let (outcome, errors) = run_all(&[course], sequence..sequence + 1);
+        assert_eq!((outcome.count, errors), (1, Vec::<String>::new()));
+    }
+}
