@@ -54,7 +54,7 @@ const WANTED: [(&str, f64, [f64; 2]); 12] = [
 /// Rows that miss what was asked (`docs/figures.md` tells why), and what they hold, s.
 const MISSED: [(&str, f64, [f64; 2]); 2] = [
     ("freeform", 3600.0, [225.5, 214.9]),
-    ("freeform", 6000.0, [175.0, 166.3]),
+    ("freeform", 6000.0, [175.0, 165.9]),
 ];
 
 /// The greatest times of a row that hold.

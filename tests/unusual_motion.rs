@@ -182,3 +182,32 @@ fn random_surfaces_against_the_best() {
     );
     assert!(worst.0 <= 1.1, "{worst:?}");
 }
+
+/// A parabola, z = -x^2 / 60, whose first patches are 0.8 mm long and whose last one is 64 mm: its stations are 9 mm apart.
+#[test]
+fn a_patch_that_is_much_longer_than_the_others() {
+    const SHORT: u32 = 20;
+    let inner = (1..=SHORT).map(|knot| 0.01 * f64::from(knot));
+    let knots: Vec<f64> = [0.0; 3].into_iter().chain(inner).chain([1.0; 3]).collect();
+    let x = |t: f64| 80.0 * t - 40.0;
+    let mut rows = String::new();
+    for pair in knots[1..knots.len() - 1].windows(2) {
+        // The pole of a polynomial is its polar form at the knots.
+        let (from, to) = (x(pair[0]), x(pair[1]));
+        let [x, z] = [0.5 * (from + to), -from * to / 60.0];
+        writeln!(rows, "[[{x:.9}, 0, {z:.9}], [{x:.9}, 3, {z:.9}]],").unwrap();
+    }
+    let text = format!(
+        "[surface]\nkind = \"nurbs\"\ndegree = [2, 1]\nknots_u = {knots:?}\nknots_v = [0, 0, 1, 1]\npoles_mm = [\n{rows}]\n\
+        [tool]\nkind = \"ball\"\nradius_mm = 3\n[cut]\nfeed_mm_min = 6000\nscallop_mm = 0.05\nalong = \"u\"\nside = \"up\"\npattern = \"zigzag\"\n"
+    );
+    let mut job = job_file::parse("parabola", &text).unwrap();
+    job.machine.limits = Some(machine(100.0, 1000.0, 20_000.0));
+    let Used { shares, .. } = used(&job);
+    println!("{shares:.4?} of the limits");
+    let [velocity, acceleration, jerk] = shares;
+    assert!(
+        velocity <= 1.0005 && acceleration <= 1.0 && jerk <= 1.02,
+        "{shares:?}"
+    );
+}

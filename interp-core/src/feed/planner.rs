@@ -83,7 +83,7 @@ mod cycles {
     /// More for a jump behind the node.
     pub(super) const JUMP: u32 = 3_500;
     pub(super) const CHECK: u32 = 1_900;
-    pub(super) const GATE: u32 = 2_850;
+    pub(super) const GATE: u32 = 2_950;
     pub(super) const GATE_PLACE: u32 = 22_000;
     /// The start of a plan with an end at speed.
     pub(super) const BLEND: u32 = 25_000;

@@ -50,7 +50,7 @@ pub(crate) const CELL_MIN_MM: f32 = 0.15;
 pub(crate) const CELL_FINE_MM: f32 = 0.25;
 pub(crate) const CELLS_FINE: u16 = 4;
 
-/// Length of a cell, mm, above which its derivatives are not straight from end to end: those of a pass whose patches are longer than those of the last one.
+/// Length of a cell, mm, above which its derivatives are not straight from end to end: a patch much longer than the others of its pass has such cells.
 const LONG_MM: f32 = 0.6;
 
 /// Most cells that derivatives are taken over for one between stations.

@@ -2,10 +2,15 @@
 
 use crate::job::program::Job;
 use crate::job::{Header, Pattern};
+use crate::math::arith::fraction_to_f32;
+use crate::math::number::Bounded;
 use crate::pass::front::{FrontLine, FrontPiece, PiecePlace};
 use crate::pass::patch::OnFront;
 use crate::pass::position::PassPosition;
 use crate::sample::SpanParameter;
+
+/// Least share of a patch that counts.
+const SHARE_MIN: f32 = 1e-3;
 
 /// A pass from place to place.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -126,6 +131,14 @@ impl Route {
         Some(self.piece(next.span))
     }
 
+    /// Length of a pass on a line by the path parameter: the number of its patches, of which the first and the last may be parts.
+    pub(crate) fn spans(&self) -> f32 {
+        let [start, end] = self
+            .ends
+            .map(|end| f32::from(end.span) + fraction_to_f32(end.fraction));
+        (end - start).abs().at_least(SHARE_MIN)
+    }
+
     /// The curve of a piece of a front on the patch of another; none where it is on another patch.
     pub(crate) fn curve_on_same_patch(&self, job: &Job<'_>, piece: &Piece, next: &Piece) -> Option<OnFront> {
         let (front, on) = (self.front.as_ref()?, next.front.as_ref()?);
@@ -208,5 +221,10 @@ impl Piece {
     /// Whether it is as long as the patch.
     pub(crate) const fn is_whole(&self) -> bool {
         matches!(self.range, [0, u64::MAX])
+    }
+
+    /// The share of the patch that it is.
+    pub(crate) fn share(&self) -> f32 {
+        fraction_to_f32(self.end().saturating_sub(self.start())).at_least(SHARE_MIN)
     }
 }

@@ -119,21 +119,22 @@ impl Plan {
         if around > 0.0 {
             // The jerk changes along an interval and steps at a node: all of the time that the place stands for counts.
             let within = around * root * r;
+            // The jerk of a period is a mean over three.
+            let reach = within + 0.5 * limits.period * root * r;
             let mut add = |j: f32| (least, most) = (least.at_most(j), most.at_least(j));
             add(j - change * within.at_most(x));
             add(j + change * within.at_most(1.0 - x));
-            let beside = if x + 2.0 * within > 1.0 && cursor.interval + 1 < self.intervals {
-                Some((cursor.interval + 1, 0.0, (x + within - 1.0).at_least(0.0)))
-            } else if x < 2.0 * within && cursor.interval > 0 {
-                Some((cursor.interval - 1, 1.0, (x - within).at_most(0.0)))
-            } else {
-                None
-            };
-            if let Some((index, node, beyond)) = beside {
+            let mut add_beside = |index: u16, node: f32, beyond: f32| {
                 let beside = self.interval_of(pace, index);
                 let [j, change] = jerk(beside.walk_rates(node), beside.pace_rates(node), inverse);
                 add(j);
                 add(j + beyond * change);
+            };
+            if x < reach && cursor.interval > 0 {
+                add_beside(cursor.interval - 1, 1.0, (x - within).at_most(0.0));
+            }
+            if x + reach > 1.0 && cursor.interval + 1 < self.intervals {
+                add_beside(cursor.interval + 1, 0.0, (x + within - 1.0).at_least(0.0));
             }
         }
         // Near the feed the tool moves at exactly that, and the plan's own jerk may help nothing.

@@ -16,9 +16,9 @@ impl Run {
         (travel.pass, path, travel.side)
     }
 
-    /// Number of the patch from the start of the pass, and of the cell within the patch, at the position, for a number of cells per patch; none where
+    /// Number of the patch from the start of the pass, and of the cell within the patch, at the position, by the number of cells of each patch; none where
     /// the pass is over.
-    pub(crate) fn cell(&self, cells_per_patch: u16) -> Option<[u16; 2]> {
+    pub(crate) fn cell(&self, cells_of: impl Fn(u16) -> u16) -> Option<[u16; 2]> {
         if !self.is_along() {
             return None;
         }
@@ -29,19 +29,20 @@ impl Run {
         let [start, _] = travel.route.ends;
         let patch = travel.span().abs_diff(start.span);
         let piece = &travel.piece;
+        let cells = cells_of(patch);
         let within = if piece.is_whole() {
-            let high = (travel.fraction >> 32) * u64::from(cells_per_patch);
+            let high = (travel.fraction >> 32) * u64::from(cells);
             u16::try_from(high >> 32).unwrap_or(0)
         } else {
             let part = fraction_to_f32(travel.fraction.saturating_sub(piece.start()))
                 / fraction_to_f32(piece.end().saturating_sub(piece.start()));
-            let cell = u16::try_from(truncated(part * f32::from(cells_per_patch))).unwrap_or(0);
-            cell.min(cells_per_patch.saturating_sub(1))
+            let cell = u16::try_from(truncated(part * f32::from(cells))).unwrap_or(0);
+            cell.min(cells.saturating_sub(1))
         };
         Some([patch, within])
     }
 
-    /// Arc since the start of a cell of [`Self::cell`], mm, by the number of cells per patch and the fraction of a whole patch in one of them; none where, by
+    /// Arc since the start of a cell of [`Self::cell`], mm, by the number of cells of its patch and the fraction of a whole patch in one of them; none where, by
     /// rounding, the position is before the cell.
     pub(crate) fn since_station(&self, [_, within]: [u16; 2], (cells, part): (u16, u64)) -> Option<f32> {
         let travel = &self.travel;

@@ -111,7 +111,8 @@ pub(crate) struct Lookahead {
     /// Station within the patch, from 0, and patches so far.
     station: u16,
     patches: u16,
-    /// Cells of the patch that are looked at: for each of those between kept stations, and all of them, with the fraction of the patch of one.
+    /// Cells of the patch: those between kept stations, those that are looked at for each of them, and all of these, with the fraction of the patch of one.
+    kept: u16,
     looks: u16,
     cells: u16,
     cell_fraction: u64,
@@ -176,6 +177,7 @@ impl Lookahead {
         pass_mm: 0.0,
         station: 0,
         patches: 0,
+        kept: 1,
         looks: 1,
         cells: 1,
         cell_fraction: 0,
@@ -269,7 +271,7 @@ impl Lookahead {
         out.plan.stations.clear();
         out.pass = pass;
         out.route = route;
-        out.cells = 0;
+        out.set_cells(0);
         (self.centre_mm, self.bends, self.jumps) = (0.0, false, false);
         (out.point, out.is_tip) = (false, false);
         out.full_pace = 1.0;
@@ -467,6 +469,15 @@ impl Lookahead {
         }
     }
 
+    /// Number of patches of the pass, or of stretches of one on a front; parts of patches count as such.
+    fn patches_of(&self, route: &Route) -> f32 {
+        if route.is_on_front() {
+            f32::from(self.patches.saturating_add(1))
+        } else {
+            route.spans()
+        }
+    }
+
     /// Computes the interval and the next pass; returns whether that is known, and not to be sought in a region.
     fn close(
         &mut self,
@@ -475,9 +486,8 @@ impl Lookahead {
         lines: &mut RegionLines,
         out: &mut PassPlan,
     ) -> Result<bool> {
-        let patches = f32::from(self.patches.saturating_add(1));
         self.pass_mm = to_f32(self.start_q10 - out.head_q10) * MM_PER_Q10;
-        self.patch_mm = (self.pass_mm / patches).at_least(self.centre_mm);
+        self.patch_mm = (self.pass_mm / self.patches_of(&out.route)).at_least(self.centre_mm);
         (self.has_bend, self.has_jump) = (self.bends, self.jumps);
         let header = job.header;
         out.interval = interval_of(self.maximum.inv_interval_sq);

@@ -25,6 +25,10 @@ pub(crate) struct PassPlan {
     pub(crate) route: Route,
     /// Cells of a patch (on a front: of a stretch) between kept stations, 0 before the first patch, and the fraction of the patch per cell.
     pub(super) cells: u16,
+    /// Those of the first patch, and of the last one and its number, where only a part of it is machined.
+    first_cells: u16,
+    last_cells: u16,
+    last_patch: u16,
     pub(super) cell_fraction: u64,
     /// Patches of a group: where a pass has more than [`PATCHES`], the ends of groups are kept, with the greatest derivatives within them.
     pub(super) group: u16,
@@ -63,6 +67,9 @@ impl PassPlan {
         pass: 0,
         route: Route::NONE,
         cells: 0,
+        first_cells: 0,
+        last_cells: 0,
+        last_patch: u16::MAX,
         cell_fraction: 0,
         group: 1,
         point: false,
@@ -83,9 +90,35 @@ impl PassPlan {
         tail_q10: 0,
     };
 
-    /// Cells of a patch between kept stations, and the fraction of the patch per cell.
-    pub(crate) const fn kept_cells(&self) -> (u16, u64) {
-        (self.cells, self.cell_fraction)
+    /// Cells of a patch between kept stations, by its number from the start of the pass.
+    pub(crate) const fn cells_of(&self, patch: u16) -> u16 {
+        if patch == 0 {
+            self.first_cells
+        } else if patch == self.last_patch {
+            self.last_cells
+        } else {
+            self.cells
+        }
+    }
+
+    /// Sets the cells of every patch; 0 before the first.
+    pub(super) const fn set_cells(&mut self, cells: u16) {
+        (self.cells, self.first_cells) = (cells, cells);
+        self.last_patch = u16::MAX;
+    }
+
+    /// Sets those of a patch of which only a part is machined: the first one or the last one.
+    pub(super) const fn set_cells_of(&mut self, patch: u16, cells: u16) {
+        if patch == 0 {
+            self.first_cells = cells;
+        } else {
+            (self.last_patch, self.last_cells) = (patch, cells);
+        }
+    }
+
+    /// Fraction of a whole patch in one of its cells.
+    pub(crate) const fn cell_fraction(&self) -> u64 {
+        self.cell_fraction
     }
 
     /// The pace at a feed factor: above 1 where it was planned for less.
@@ -107,7 +140,11 @@ impl PassPlan {
         if group * self.group != patch {
             return None;
         }
-        let station = self.head + group * (self.cells + 1) + within;
+        let before = match group {
+            0 => 0,
+            _ => self.first_cells + 1 + (group - 1) * (self.cells + 1),
+        };
+        let station = self.head + before + within;
         Some(i64::from(self.plan.stations.get(station).arc_nm) << Q10_BITS)
     }
 }

@@ -3,7 +3,9 @@
 use super::stretch::HALVED_MIN_MM;
 use super::{CELL_KEPT_MM, Lookahead, PATCHES, PassPlan, Task, check_crease, check_travel, stations_of};
 use crate::fault::{Fault, FaultKind, Result};
-use crate::feed::stations::{CELLS_FINE, CELLS_MANY, Derivatives, Station, WINDOW, Window, parts_of_cell};
+use crate::feed::stations::{
+    CELL_MIN_MM, CELLS_FINE, CELLS_MANY, Derivatives, Station, WINDOW, Window, parts_of_cell,
+};
 use crate::job::program::Job;
 use crate::job::{AxisLimits, SurfaceKind};
 use crate::math::arith::{fraction_to_f32, sqrt, truncated};
@@ -63,9 +65,9 @@ impl Lookahead {
                 .saturating_sub(1)
                 .max(1);
             let mean = if is_part || job.header.spacing.is_constant() {
-                // The last pass may have been one of a small part of the patch, or short stretches of a front.
+                // The first patch may be a small part, and the last pass short stretches of a front.
                 if spans > 1 {
-                    self.patch_mm.at_least(length)
+                    self.patch_mm.at_least(length / self.piece.share())
                 } else {
                     length
                 }
@@ -89,21 +91,29 @@ impl Lookahead {
             }
             out.cell_fraction = u64::MAX.checked_div(u64::from(out.cells)).unwrap_or(u64::MAX);
             out.group = spans.div_ceil(PATCHES);
+            out.set_cells(out.cells);
         }
-        self.looks = parts_of_cell(length, out.cells);
+        self.kept = out.cells;
+        if !self.piece.is_whole() && out.group == 1 {
+            // Cells of a short part that are as many as those of a whole patch are so short that their derivatives are rounding.
+            let least = CELLS_FINE.min(whole(length / HALVED_MIN_MM).max(2));
+            self.kept = whole(length / CELL_MIN_MM).max(least).min(out.cells);
+            out.set_cells_of(self.patches, self.kept);
+        }
+        self.looks = parts_of_cell(length, self.kept);
         if self.may_turn {
             // Two cells have one second derivative and no third, by which a coarse look is known.
             let least = CELLS_FINE.min(whole(length / HALVED_MIN_MM).max(1));
-            self.looks = self.looks.max(least.div_ceil(out.cells.max(1)));
+            self.looks = self.looks.max(least.div_ceil(self.kept.max(1)));
         }
         out.plan.stations.note_cells(out.cells, out.group);
         self.begun = out.plan.stations.count();
-        self.divide_patch(out);
+        self.divide_patch();
     }
 
     /// Begins the stations of a patch, with the cells that are looked at for each of those between kept ones.
-    pub(super) fn divide_patch(&mut self, out: &PassPlan) {
-        self.cells = out.cells * self.looks;
+    pub(super) fn divide_patch(&mut self) {
+        self.cells = self.kept * self.looks;
         let whole = self.piece.end().saturating_sub(self.piece.start());
         self.cell_fraction = whole.checked_div(u64::from(self.cells)).unwrap_or(u64::MAX);
         self.window = Window::EMPTY;

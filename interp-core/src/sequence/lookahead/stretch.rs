@@ -95,7 +95,7 @@ impl Lookahead {
         } else {
             (self.pass_mm / f32::from(room)).at_least(STRETCH_MIN_MM)
         };
-        out.cells = 1;
+        out.set_cells(1);
         let feed = job.header.feed_mm_s;
         let limits = MotionLimits::new(axes, feed, job.header.period_s);
         self.per_limit = limits.inverse.map(
@@ -201,7 +201,7 @@ impl Lookahead {
         out.plan.stations.truncate(self.begun);
         if !self.is_on_front() {
             self.looks = (2 * self.looks).min(PARTS_MAX);
-            self.divide_patch(out);
+            self.divide_patch();
             return Some(Task::Station);
         }
         let [first, _] = self.stretch;

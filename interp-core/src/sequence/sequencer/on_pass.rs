@@ -202,14 +202,16 @@ impl Sequencer {
             return;
         }
         let (now, _) = both(&mut self.plans, self.second);
-        let kept = now.kept_cells();
         if let Some(apart_q10) = self.correction {
             if self.follower.correct(&now.plan, apart_q10) {
                 self.correction = None;
             }
             return;
         }
-        let Some(cell) = run.cell(kept.0).filter(|cell| *cell != self.cell) else {
+        let Some(cell) = run
+            .cell(|patch| now.cells_of(patch))
+            .filter(|cell| *cell != self.cell)
+        else {
             return;
         };
         self.cell = cell;
@@ -217,6 +219,7 @@ impl Sequencer {
             true => now.arc_at_piece_q10(cell[0]),
             false => now.arc_q10(cell),
         };
+        let kept = (now.cells_of(cell[0]), now.cell_fraction());
         let (Some(start_q10), Some(since_mm)) = (arc, run.since_station(cell, kept)) else {
             return;
         };

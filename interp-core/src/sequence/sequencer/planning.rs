@@ -26,7 +26,7 @@ const SPARE_BEFORE_TURN: u32 = 30;
 
 /// Cycles of one place of a search for a change of the pace, along a pass and along a link, and of its begin along a pass; of a portion of a
 /// step-over's planning.
-const PACE_CYCLES: u32 = 2_850;
+const PACE_CYCLES: u32 = 2_950;
 const PACE_BEGIN_CYCLES: u32 = 14_000;
 const LINK_PACE_CYCLES: u32 = 2_000;
 const STEP_OVER_CYCLES: u32 = 6_000;
