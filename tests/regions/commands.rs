@@ -37,7 +37,7 @@ fn course(seed: u64, is_curved: bool) -> Option<Course> {
         .then(|| Course::of(&format!("region {seed} {:?}", job.spacing), &prepared))
 }
 
-/// Limits are kept, each pass ends where it does without commands, and each run comes to its end.
+/// Limits are kept, each pass ends where it does without commands, the tool never stands in contact, and each run comes to its end.
 fn run_sequences(is_curved: bool) {
     let (mut all, mut errors) = (Outcome::default(), Vec::new());
     let seeds = seeds(8);
@@ -53,6 +53,7 @@ fn run_sequences(is_curved: bool) {
     }
     println!("{all:?}");
     assert!(errors.is_empty(), "{errors:#?}");
+    assert!(all.stands.is_empty(), "{:?}", all.stands);
     assert!(all.count as u64 >= least, "{} sequences", all.count);
 }
 
@@ -73,5 +74,15 @@ fn a_pace_that_changes_where_the_jerk_does() {
         let course = course(region, true).unwrap();
         let (outcome, errors) = run_all(&[course], sequence..sequence + 1);
         assert_eq!((outcome.count, errors), (1, Vec::<String>::new()));
+    }
+}
+
+/// The tool rises for every wait at the end of a pass: of up to 15 ms it stood here.
+#[test]
+fn no_wait_is_in_contact() {
+    for (region, is_curved, sequence) in [(88, false, 2649), (105, true, 3151), (513, true, 15396)] {
+        let course = course(region, is_curved).unwrap();
+        let (outcome, errors) = run_all(&[course], sequence..sequence + 1);
+        assert_eq!((outcome.stands, errors), (vec![], Vec::<String>::new()));
     }
 }

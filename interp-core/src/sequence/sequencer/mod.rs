@@ -33,8 +33,8 @@ use next_step::NextStep;
 /// Least distance of a place within a pass from its ends, 0.5 mm, units of 2^-10 nm: the rest of the pass has cells of its own.
 const WITHIN_Q10: i64 = 500_000 << 10;
 
-/// Longest stand at the end of a pass, periods: for more the tool rises, which takes some ten times as long.
-const STAND_MAX: f32 = 15.0;
+/// Longest stand at the end of a pass, periods: for more the tool rises, however much longer that takes, because a stand leaves a mark.
+const STAND_MAX: f32 = 3.0;
 
 /// Phase of the sequence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
