@@ -25,7 +25,7 @@ pub(crate) const FIRMWARE_VERSION: [u16; 3] = [
     version_part(env!("CARGO_PKG_VERSION_PATCH")),
 ];
 
-/// Sampling period, us. That of Lo 1998, and a common set-point period of servo drives.
+/// Sampling period, us: a common set-point period of servo drives.
 pub(crate) const PERIOD_US: u32 = 1_000;
 
 /// One period in counts of the reference clock (TIM5).

@@ -49,7 +49,7 @@ pub enum FaultKind {
     LimitSwitch = 17,
     /// A drive reports a fault: the drives are off, the machine is not homed. Value: the drive faults asserted, as bits.
     DriveFault = 18,
-    /// Link timeout: no frame of the host for longer than configured. Value: the timeout in periods.
+    /// Link timeout: no request of the host that the board answers for longer than configured. Value: the timeout in periods.
     LinkTimeout = 19,
     /// A start while the machine is not homed. Value: 0.
     NotHomed = 20,

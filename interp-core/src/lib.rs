@@ -28,10 +28,10 @@
 //! | `pass` | along a pass, and from pass to pass |
 //! | `feed` | the feed within the limits of the axes |
 //! | `sequence` | approach, passes, links and retract on a machine with limits |
-//! | `positioning` | moves of one axis outside a job |
+//! | `positioning` | moves of one axis, or of several along a line, outside a job |
 //! | `steps` | from positions to step pulses |
 //!
-//! A folder uses those above it only, and `steps` none but `math`; `tests/folders.rs` holds it.
+//! A folder uses those above it only, beside faults and samples, and `steps` none but `math`; `tests/folders.rs` holds it.
 //!
 //! Nothing here allocates, blocks, panics or uses f64; the same calls give the same bits on every machine. Lengths are mm
 //! (f32) or nm (i32), angles turns or radians as named, parameters fractions of a span. Build job data from ordinary

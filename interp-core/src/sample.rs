@@ -17,7 +17,7 @@ pub enum State {
     Holding = 3,
     /// Feed hold: at standstill on the path, to be resumed.
     Held = 4,
-    /// Decelerating for an abort or a fault.
+    /// Decelerating for a stop, an abort or a fault.
     Stopping = 5,
     /// The job's last sample was emitted.
     Finished = 6,

@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 
 /// Each uses those before it; files beside the folders count as shown.
-const ORDER: [&str; 10] = [
+const ORDER: [&str; 11] = [
     "fault",
     "math",
     "sample",
@@ -14,6 +14,7 @@ const ORDER: [&str; 10] = [
     "pass",
     "feed",
     "sequence",
+    "positioning",
     "interpolator",
 ];
 

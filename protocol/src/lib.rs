@@ -17,14 +17,15 @@
 //! | `Hello` | → ← | `Capabilities` |
 //! | `JobBegin`, `JobChunk` .., `JobEnd` | → ← | `Ack` or `Nak` each |
 //! | `Clock`, `Report`, `StepConfig` | → ← | `Ack` or `Nak` |
-//! | `Start`, `Hold`, `Resume`, `Stop`, `Abort`, `Override` | → ← | `Ack` or `Nak` |
+//! | `Start`, `StartAt`, `StartJob`, `Hold`, `Pause`, `Resume`, `Stop`, `Abort`, `Override` | → ← | `Ack` or `Nak` |
 //! | `Configure`, `Drives`, `SetHome`, `Acknowledge`, `SetProfile` | → ← | `Ack` or `Nak` |
-//! | `Profile`, `Offsets`, `Motion` | → ← | the same |
-//! | `Jog`, `Home`, `Probe`, `SetOffsets`, `Spindle` | → ← | `Ack` or `Nak` |
+//! | `Profile`, `Offsets`, `Motion`, `Journal`, `StoredJob` | → ← | the same |
+//! | `Jog`, `Home`, `Probe`, `SetOffsets`, `Spindle`, `Turn`, `Coolant`, `Simulate` | → ← | `Ack` or `Nak` |
+//! | `StoreJob`, `DeleteJob` | → ← | `Ack` or `Nak` |
 //! | `Run` | → ← | `Ack` or `Nak`, later `Halted` |
 //! | `Status` | → ← | `Status` |
 //! | `Repeat` | → ← | events again, then `Ack`; or `Nak` |
-//! | | ← | `Samples`, `PassDigest`, `Halted` while a run goes on |
+//! | | ← | `Samples`, `PassDigest`, `Room`, `Halted` while a run goes on |
 //!
 //! The module's documentation has every message's bytes. One request is outstanding at a time; each has a number, and gets
 //! one answer.
@@ -43,6 +44,10 @@
 //! | a job, clock or step settings while a run is under way | `Nak`, `WrongState` with the state | |
 //! | a chunk that is not the next, or too many words | `Nak`, `WrongOffset`, `TooLong` | |
 //! | a chunk of a streamed job with a row whose digest is wrong, or that the core refuses | `Nak`, `WrongDigest`, `Job` with fault, value, record | a run stops before that row |
+//! | a chunk or `JobEnd` without `JobBegin` | `Nak`, `NoUpload` | |
+//! | a command while the queue of commands is full | `Nak`, `Busy` | |
+//! | `Run` without lockstep | `Nak`, `WrongClock` with the clock | |
+//! | what this board does not support | `Nak`, `Unsupported` | |
 //! | `JobEnd` too early | `Nak`, `Incomplete` | the upload may go on |
 //! | `JobEnd` with other words than announced | `Nak`, `WrongDigest` | the upload is over, no job is loaded |
 //! | `JobEnd` of a job that the core refuses | `Nak`, `Job` with fault, value, record | the upload is over, no job is loaded |
@@ -62,6 +67,8 @@
 //! | a jog or probe move beyond the travel | `Nak`, `BeyondTravel` with the range | |
 //! | homing without its section in the profile | `Nak`, `NoHoming` | |
 //! | a probe move while the probe is tripped | `Nak`, `ProbeTripped` | |
+//! | a probe move while the spindle turns | `Nak`, `SpindleTurns` | |
+//! | a jog at a feed override of 0 | `Nak`, `NoFeed` | |
 //! | a spindle on a machine without one | `Nak`, `NoSpindle` | |
 //! | a start of a streamed job whose first rows were overwritten | `Nak`, `RowsGone` | |
 //! | a start at a pass, of a job without axis limits or of a streamed one | `Nak`, `WholeOnly` | |

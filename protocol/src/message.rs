@@ -64,13 +64,14 @@
 //! | 38 | `StartJob` | name, 1 to go on where the last run of it was cut short | `Ack`: it is loaded, and starts as by `Start` |
 //!
 //! Header: kind, pattern, spacing, tool side (a byte each), spans along path and side (`u16`), ball radius (mm), feed (mm/s),
-//! scallop height (mm), period (s) (`f32`), window of a streamed job (rows, `u16`; 0 for another one), number of its strips (`u16`); then 0, or 1 and the axes' limits: velocity (mm/s), acceleration (mm/s^2), jerk (mm/s^3)
-//! (three `f32` each), chord error (mm, `f32`), travel (least and most of each axis), home (nm, `i32`), plunge (mm, `f32`), safe height
-//! (nm, `i32`).
+//! scallop height (mm), period (s) (`f32`), edges of its regions, words of its links (`u16` each), window of a streamed job (rows, `u16`; 0 for another one),
+//! number of its strips (`u16`); then 0, or 1 and the axes' limits: velocity (mm/s), acceleration (mm/s^2), jerk (mm/s^3) (three `f32` each), chord error
+//! (mm, `f32`), travel (least and most of each axis), home (nm, three `i32` each), end (option of three `i32`, nm), its height (nm, `i32`), plunge (mm,
+//! `f32`), safe height (nm, `i32`), overrun (mm, `f32`).
 //!
 //! # Board to host
 //!
-//! Payload: code (1 byte), fields. The first four answer a request and carry its number; the others are unsolicited events.
+//! Payload: code (1 byte), fields. Codes 4, 5, 6 and 10 are unsolicited events; the others answer a request and carry its number.
 //!
 //! | code | message | fields |
 //! |---|---|---|
@@ -81,12 +82,12 @@
 //! | 4 | `Samples` | event `u32`, list of samples (tick, state, pass, path and side parameter, feed, CC and CL, interval) |
 //! | 5 | `PassDigest` | event `u32`, the fields of [`PassDigest`] |
 //! | 6 | `Halted` | the fields of [`Status`], with the event in `events` |
-//! | 7 | `Profile` | number, option of the fields of [`Profile`]; an answer like the first four |
-//! | 8 | `Motion` | number, the fields of [`MotionStatus`]; an answer |
-//! | 9 | `Offsets` | number, the fields of [`Offsets`]; an answer |
+//! | 7 | `Profile` | number, option of the fields of [`Profile`] |
+//! | 8 | `Motion` | number, the fields of [`MotionStatus`] |
+//! | 9 | `Offsets` | number, the fields of [`Offsets`] |
 //! | 10 | `Room` | event `u32`, words up to which there is room `u32` |
-//! | 11 | `Journal` | number, option of the fields of [`Journal`]; an answer |
-//! | 12 | `StoredJob` | number, option of the fields of [`StoredJobInfo`] (none beyond the last), words of the longest job for which there is room `u32`; an answer |
+//! | 11 | `Journal` | number, option of the fields of [`Journal`] |
+//! | 12 | `StoredJob` | number, option of the fields of [`StoredJobInfo`] (none beyond the last), words of the longest job for which there is room `u32` |
 //!
 //! A parameter is its span (`u16`) and fraction. `Halted` comes when the ticks of a `Run` are used up, or when a run ends
 //! (finished, faulted, aborted), whichever is first.

@@ -222,7 +222,8 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
             .unwrap_or_else(|| self.motion.run.surface_position())
     }
 
-    /// Whether the loaded job has axis limits: each pass then starts and ends at standstill, and links join the passes.
+    /// Whether the loaded job has axis limits: each pass then starts and ends at standstill, unless a turn joins it to the next, and links join the
+    /// passes.
     #[must_use]
     pub const fn has_limits(&self) -> bool {
         self.motion.program.header().axes.is_some()
@@ -270,9 +271,9 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
         self.motion.evaluate(self.store.as_ref(), path, side)
     }
 
-    /// Controlled stop (IEC 60204-1 category 1) with an external fault, such as a missed deadline: the tool decelerates along the path to zero feed over
-    /// [`STOP_PERIODS`] ([`State::Stopping`]), or until the end of the pass if that is nearer. A held run faults
-    /// immediately. Ignored where no run is under way.
+    /// Controlled stop (IEC 60204-1 category 1) with an external fault, such as a missed deadline: the tool decelerates along the path to zero feed ([`State::Stopping`]):
+    /// within 1.1 times the acceleration and 1.5 times the jerk limits of a job that has them, else over [`STOP_PERIODS`] or until the end of the pass if that is
+    /// nearer. A held run faults immediately. Ignored where no run is under way.
     pub fn controlled_stop(&mut self, fault: Fault) {
         self.motion.controlled_stop(fault);
     }
@@ -295,7 +296,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
     /// One period. Does not block or panic; execution time is bounded by one patch collapse and its evaluation at a few
     /// points, and at the start of a pass by a loop over 16 side spans.
     ///
-    /// While the job runs, each call yields a sample with [`State::Running`] or [`State::Stopping`], counted by its `tick` from 0;
+    /// While the job runs, each call yields a sample with [`State::Running`], [`State::Linking`], [`State::Holding`] or [`State::Stopping`], counted by its `tick` from 0;
     /// the one after the last has [`State::Finished`]. In every state at standstill the sample repeats the last position.
     ///
     /// Also needs [`Self::plan`], once after each tick. Without it the tool of a job with axis limits waits at the start of a pass for ever; that of a job without
@@ -315,7 +316,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
         self.motion.has_to_plan()
     }
 
-    /// The planning of one period: a fixed portion of work, at most 30 000 cycles of a Cortex-M4F. To be called once after each tick and before the
+    /// The planning of one period: a fixed portion of work, 28 000 cycles of a Cortex-M4F at most. To be called once after each tick and before the
     /// next, on a board from a task of lower priority than the tick's. The samples depend on the number of calls between two ticks: with one after each,
     /// they are the same on every machine. Does nothing where [`Self::has_to_plan`] is false. A fault of the surface ahead is reported by the tick that
     /// reaches it.

@@ -104,8 +104,8 @@ pub enum Spacing {
     /// The widest interval whose scallop height stays within the limit over the gap to the next pass, by the surface evaluated in the gap and the ball's circle.
     #[default]
     Exact = 0,
-    /// The paper's interval, from the pass alone (eqns 10 and 11). The scallop height may exceed the limit by 1 to 2 % where the surface
-    /// changes from pass to pass, and by more at the ends of skew passes.
+    /// The paper's interval, from the pass alone (eqns 10 and 11). The scallop height may exceed the limit by up to 3 % where the surface
+    /// changes from pass to pass, and several times at the ends of skew passes.
     FirstOrder = 1,
     /// Passes of constant scallop height ([`crate::Interpolator::plan`] makes each from the one before): curves `side = g(path)`, the first on the surface's first side
     /// boundary. The limit holds as with [`Self::Exact`].
@@ -162,7 +162,7 @@ pub enum ToolSide {
     Minus = 1,
 }
 
-/// Limits of the machine's axes x, y, z, and their travel. With limits each pass starts and ends at standstill, and links join the passes;
+/// Limits of the machine's axes x, y, z, and their travel. With limits each pass starts and ends at standstill, unless turns join them ([`Self::overrun_mm`]), and links join the passes;
 /// without limits the feed is constant from the first sample to the last, as in Lo 1998.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AxisLimits {

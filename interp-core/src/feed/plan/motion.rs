@@ -120,7 +120,7 @@ impl Plan {
             // The jerk changes along an interval and steps at a node: all of the time that the place stands for counts.
             let within = around * root * r;
             // The jerk of a period is a mean over three.
-            let reach = within + 0.5 * limits.period * root * r;
+            let reach = within + limits.period * root * r;
             let mut add = |j: f32| (least, most) = (least.at_most(j), most.at_least(j));
             add(j - change * within.at_most(x));
             add(j + change * within.at_most(1.0 - x));
