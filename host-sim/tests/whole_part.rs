@@ -127,10 +127,40 @@ fn a_part_without_a_job_tells_why() {
     for face in summary["faces"].as_array().unwrap() {
         assert!(face["job"].is_null() && face["error"].is_string(), "{face}");
     }
-    assert_eq!(
-        run(folder.path(), "import hood.step --part --tool 3 -o hood.toml")
-            .status
-            .code(),
-        Some(2)
-    );
+    for (options, words) in [
+        ("--tool 3", "no face of hood.step has a job: face 1:"),
+        ("--tool nan", "--tool must be above 0 and at most 1000, not NaN"),
+        (
+            "--tool 1 --scallop-mm 1",
+            "--scallop-mm must be below the ball's radius of 1 mm",
+        ),
+        ("--tool 1 --scallop-mm inf", "--scallop-mm must be above 0"),
+        (
+            "--tool 1 --feed-mm-min 60001",
+            "--feed-mm-min must be above 0.06 and at most 60000",
+        ),
+        ("--tool 1 --tolerance 0", "--tolerance must be above 0"),
+        ("--tool 1 --faces 1,99", "there is no face 99"),
+    ] {
+        let output = run(
+            folder.path(),
+            &format!("import hood.step --part -o hood.toml {options}"),
+        );
+        let said = String::from_utf8_lossy(&output.stderr).replace("\n  │", "");
+        assert_eq!(output.status.code(), Some(2), "{options}: {said}");
+        assert!(said.contains(words), "{options}: {said}");
+    }
+}
+
+/// What stands alone bounds no solid, and the file does not tell which side is machined: that which looks up, either way round.
+#[test]
+fn a_surface_alone_is_machined_from_either_side() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::copy(cad("swept.igs"), folder.path().join("swept.igs")).unwrap();
+    for up in ["+z", "-z"] {
+        let command = format!("import swept.igs --part --tool 0.5 --up {up} -o side{up} --json");
+        let (summary, code) = json(folder.path(), &command);
+        assert_eq!(code, Some(0), "{summary}");
+        assert!(number(&summary["reachable_mm2"]) > 0.0, "{up}: {summary}");
+    }
 }

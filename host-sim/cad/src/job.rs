@@ -26,6 +26,11 @@ pub const LIMITS: &str = "# Axis limits: put in those of the machine, or run wit
      velocity_max_mm_s = [100, 100, 50]\n\
      acceleration_max_mm_s2 = [1000, 1000, 500]\n\
      jerk_max_mm_s3 = [20000, 20000, 10000]\n";
+/// The same for a face by itself, which may be for studying the geometry.
+const NO_LIMITS: &str = "# A machine's axis limits, or its profile (--machine FILE): without them the job is for studying the geometry.\n\
+     # velocity_max_mm_s = [100, 100, 50]\n\
+     # acceleration_max_mm_s2 = [1000, 1000, 500]\n\
+     # jerk_max_mm_s3 = [20000, 20000, 10000]\n";
 /// Digits of a written coordinate: full precision of f64.
 const COLUMN: usize = 100;
 
@@ -308,7 +313,7 @@ fn text(
             &options.pattern,
             if options.in_part { "zigzag" } else { "zig" }
         )),
-        if options.in_part { LIMITS } else { "" }
+        if options.in_part { LIMITS } else { NO_LIMITS }
     );
     out
 }

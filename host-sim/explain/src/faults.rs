@@ -48,7 +48,7 @@ fn words(kind: FaultKind) -> [&'static str; 5] {
             "The coordinate in metres. Positions are nanometres in 32 bits: from -2.147 m to 2.147 m.",
             "The surface is within the range, but the ball's centre, offset by its radius, is not.",
             "Move the part nearer to the origin, for example with `[placement]` and `place = \"centre\"`.",
-            "A level surface at z = 2145 mm, with a ball of 5 mm above it: the centre would be at 2.150 m.",
+            "A level surface at z = 2145 mm, with a ball of radius 5 mm above it: the centre would be at 2.150 m.",
         ],
         FaultKind::TooManyPatches => [
             "The surface data of the job exceed the machine's store, or of a streamed job the rows that have to be there at once.",

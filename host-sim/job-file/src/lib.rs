@@ -24,9 +24,10 @@ mod text;
 
 use std::path::Path;
 
+use interp_core::command::OVERRIDE_MAX_PERCENT;
 use job::{
     Along, AlongChoice, CHORD_DEFAULT_MM, CadSource, FEED_MAX_MM_MIN, FEED_MIN_MM_MIN, Job, JobError,
-    MachineProfile, MachineSpec, OVERRUN_MAX_MM, Pattern, Side, Spacing, Start, StartChoice,
+    MachineProfile, MachineSpec, OVERRUN_MAX_MM, Pattern, STEP_MAX_MM, Side, Spacing, Start, StartChoice,
 };
 use patches::placement::Placement;
 use section::{Reader, Section};
@@ -236,10 +237,25 @@ fn parse_on(
         },
         origin,
     };
+    check_feed(&cut, &job)?;
     if trimmed || job.origin.part().is_some() {
         own_region(&document, &mut job, faces)?;
     }
     Ok(job)
+}
+
+/// Within axis limits a period at the greatest override fits the core's step.
+fn check_feed(cut: &Section<'_>, job: &Job) -> Result<(), JobError> {
+    let override_max = f64::from(OVERRIDE_MAX_PERCENT) / 100.0;
+    let most = STEP_MAX_MM / override_max * 60e6 / job.machine.period_us;
+    if !job.machine.has_limits() || job.feed_mm_min <= most {
+        return Ok(());
+    }
+    let what = format!(
+        "`feed_mm_min` must be at most {most} on a machine with limits and a period of {} us, not {}",
+        job.machine.period_us, job.feed_mm_min
+    );
+    Err(cut.error("feed_mm_min", what, "lower the feed, or shorten period_us"))
 }
 
 /// How far the surface of a face must go on beyond it, in mm of its file, for passes to begin and end beside it.

@@ -313,6 +313,7 @@ fn ranges() {
         (REVOLVED, "[100, 100, 50]", "[100, 0, 50]", 22, 21, "`velocity_max_mm_s` must be above 0, not 0"),
         (REVOLVED, "[-500, 500]", "[500, -500]", 25, 13, "the travel of x must ascend"),
         (REVOLVED, "period_us = 1000", "host_gone = \"stop\"", 21, 13, "`host_gone` cannot be \"stop\""),
+        (REVOLVED, "feed_mm_min = 600", "feed_mm_min = 60001", 13, 15, "`feed_mm_min` must be at most 60000 on a machine with limits and a period of 1000 us, not 60001"),
         (REVOLVED, "period_us = 1000", "host_gone_ms = 99", 21, 16, "`host_gone_ms` must be 100 to 60000, not 99"),
         (REVOLVED, "period_us = 1000", "homing_required = 0", 21, 19, "`homing_required` must be true or false, not a number"),
         (NURBS, "degree = [2, 1]", "degree = [4, 1]", 3, 11, "`degree`, number 1 must be a whole number from 1 to 3"),

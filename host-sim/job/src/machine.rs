@@ -4,7 +4,7 @@
 pub const AXES: [&str; 3] = ["x", "y", "z"];
 /// Shortest and longest sampling period, µs: the core's limits.
 pub const PERIOD_RANGE_US: [f64; 2] = [10.0, 100_000.0];
-/// Default of the sampling period, µs: the paper's.
+/// Default of the sampling period, µs: a common set-point period of servo drives.
 pub const PERIOD_DEFAULT_US: f64 = 1000.0;
 /// Shortest and longest heartbeat timeout, ms. The shortest allows for a host that shares its processor.
 pub const HEARTBEAT_TIMEOUT_RANGE_MS: [f64; 2] = [100.0, 60_000.0];

@@ -260,6 +260,14 @@ fn interval_words(content: &Content<'_>) -> String {
         1 => String::new(),
         stride => format!(" One pass in {stride} is shown."),
     };
+    if content.job.spacing.is_constant() {
+        return format!(
+            "Each pass is a curve whose scallop to the one before reaches {} mm wherever a limit of the curve does not forbid it. Heights are by gap, the strip \
+             between two neighbouring curves. The last chart shows the least interval that any sample of a pass allows to first order, in the side parameter \
+             {side}.{thinned}",
+            content.job.scallop_mm
+        );
+    }
     format!(
         "The next pass lies where the scallop between the two stays within {} mm everywhere: the chart shows the least interval \
          that any sample of a pass allows to first order, in the side parameter {side}. In millimetres across the passes that is a range: \

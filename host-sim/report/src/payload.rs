@@ -9,7 +9,7 @@ use super::measure::{self, Gap};
 use super::record::PassInterval;
 use super::setting::setting;
 use glam::DVec3;
-use job::Along;
+use job::{Along, Spacing};
 
 const MM_PER_NM: f64 = 1e-6;
 
@@ -85,7 +85,11 @@ pub(super) fn payload(content: &Content<'_>) -> Value {
 /// Path intervals and distances by pass.
 fn intervals(content: &Content<'_>) -> Value {
     let passes = content.record.intervals.items();
-    let gaps = measure::gaps(content.oracle, &passes);
+    // Between curves the distance is not that of two lines of the surface.
+    let gaps = match content.job.spacing {
+        Spacing::Constant(_) => Vec::new(),
+        Spacing::Exact | Spacing::FirstOrder => measure::gaps(content.oracle, &passes),
+    };
     let column = |of: fn(&Gap) -> f64| gaps.iter().map(of).collect::<Vec<_>>();
     let passes: Vec<&PassInterval> = passes.iter().filter(|pass| pass.least.is_finite()).collect();
     json!({

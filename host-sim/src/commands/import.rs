@@ -2,6 +2,7 @@
 
 mod condition;
 mod list;
+mod numbers;
 mod page;
 mod whole_part;
 
@@ -262,7 +263,7 @@ fn report(
     };
     say!("  surface      {} patches, {exact}", made.patches);
     say!(
-        "  tool         ball of {} mm, side \"{}\"",
+        "  tool         ball of radius {} mm, side \"{}\"",
         written.radius_mm,
         written.side
     );
@@ -277,6 +278,7 @@ fn report(
     for warning in &written.warnings {
         say!("  note         {warning}");
     }
+    say!("  next         cargo sim verify {}", path.display());
 }
 
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
@@ -286,6 +288,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         untrimmed: arguments.untrimmed,
         ..Options::default()
     };
+    numbers::check(arguments)?;
     if !arguments.list && arguments.output.is_none() {
         return Err(Failure::input(
             "neither --list nor a job file to write",
@@ -304,6 +307,9 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let model = read_once(&arguments.file)?;
     for warning in &model.warnings {
         complain!("warning: {warning}");
+    }
+    for number in &arguments.faces {
+        chosen(&file, &model, Some(*number))?;
     }
     if let Some(folder) = arguments.output.as_ref().filter(|_| arguments.part) {
         return whole_part::command(arguments, &file, &model, folder);

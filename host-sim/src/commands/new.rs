@@ -11,7 +11,7 @@ use super::{Result, spinner, whole};
 use crate::template::{self, Kind};
 use machine::advice::advise_spacing;
 
-/// Writes a commented job file that runs at once, with every key, its unit, range and default.
+/// Writes a commented job file that runs at once, with its keys, their units, ranges and defaults.
 ///
 /// Example: cargo sim new
 /// Example: cargo sim new -o dome.toml --kind revolved

@@ -202,12 +202,16 @@ impl PartProof {
         }
         let left = &self.leftover;
         say!(
-            "       {:<22} {:.3} % of {:.3} mm2 within {} of the scallop limit; highest {:.5} mm at u = {:.6}, v = {:.6}",
+            "       {:<22} {:.3} % of {:.3} mm2 within {} of the scallop limit; {} at u = {:.6}, v = {:.6}",
             "face: left",
             100.0 * self.within(),
             left.reachable_mm2,
             1.0 + LEFTOVER_SHARE,
-            left.highest_mm,
+            if left.highest_mm.is_finite() {
+                format!("highest {:.5} mm", left.highest_mm)
+            } else {
+                "not cut".to_owned()
+            },
             left.uv[0],
             left.uv[1]
         );

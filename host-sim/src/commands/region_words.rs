@@ -56,7 +56,7 @@ pub(super) fn lines(reach: &FaceReach) -> Vec<String> {
     let short = reach.unreachable_mm2.iter().any(|(reason, _)| reason != "steep");
     match reach.radius_mm {
         Some(radius_mm) if short => lines.push(format!(
-            "a ball of {radius_mm:.3} mm would reach 99 % of what is not too steep"
+            "a ball of radius {radius_mm:.3} mm would reach 99 % of what is not too steep"
         )),
         None if short => lines.push("no ball would reach 99 % of what is not too steep".to_owned()),
         _ => {}

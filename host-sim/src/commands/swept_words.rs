@@ -153,6 +153,9 @@ pub(super) fn print(
 ) {
     scallop(job, found);
     match &found.gouge {
+        None if !found.has_samples() => {
+            say!("  ?    {:<22} not measured: the run has no sample", "gouge");
+        }
         None => say!(
             "  {} {:<22} none deeper than {:.4} um ({} cells)",
             mark(found.gouge_verdict),
@@ -326,6 +329,12 @@ fn peaks(axes: &Peaks) {
         say!(
             "  {verdict} {:<22} {x:.1}, {y:.1}, {z:.1} {unit}; {share}",
             format!("axis {name}")
+        );
+    }
+    if axes.iter().all(|peak| peak.share.is_none()) {
+        row(
+            "axis limits",
+            "none: a job for studying the geometry; for a machine, give them in [machine] or a profile by --machine",
         );
     }
 }

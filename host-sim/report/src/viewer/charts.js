@@ -327,6 +327,7 @@ class PassCharts {
             charts.push({
                 title: "Scallop height between adjacent passes, mm",
                 unit: "mm",
+                across: "gap",
                 passes: scallops.gaps,
                 rows: [["largest", "warm", columnOf(scallops.largest)], ["mean", "blue", columnOf(scallops.mean)]],
                 limit: scallops.limit,
@@ -359,8 +360,8 @@ class PassCharts {
         const L = IsoLibraries.uPlot;
         const few = each.passes.length < 80;
         const options = frame(Math.max(each.plot.clientWidth, 240), each.unit, {
-            across: "pass",
-            cursor: { sync: { key: "pass" }, drag: { x: true, y: false, setScale: true } },
+            across: each.across ?? "pass",
+            cursor: { sync: { key: each.across ?? "pass" }, drag: { x: true, y: false, setScale: true } },
             options: {
                 scales: {
                     x: { time: false },
@@ -410,7 +411,7 @@ class PassCharts {
             return [colour, name, isOver ? shown(values[index], 5) : between(low, high)];
         });
         readings(each.readout, entries);
-        const when = isOver ? `pass ${each.passes[index]}` : "over all passes";
+        const when = isOver ? `${each.across ?? "pass"} ${each.passes[index]}` : `over all ${each.across === "gap" ? "gaps" : "passes"}`;
         each.readout.append(element("span", { class: "when" }, when));
     }
 }

@@ -330,14 +330,17 @@ pub(super) fn list(arguments: &Arguments, file: &str, model: &Arc<Model>, option
 }
 
 /// What the ball reaches of each face without touching another.
-fn print_reaches(arguments: &Arguments, faces: &[&Face], reaches: &[Option<FaceReach>]) {
+fn print_reaches(arguments: &Arguments, faces: &[&Face], reaches: &[std::result::Result<FaceReach, String>]) {
     let radius_mm = arguments.radius_mm.unwrap_or(0.0);
-    say!("reach of a ball of {radius_mm} mm from +z, without touching another face:");
+    say!("reach of a ball of radius {radius_mm} mm from +z, without touching another face:");
     let mut sums = [0.0; 2];
     for (face, reach) in faces.iter().zip(reaches) {
-        let Some(reach) = reach else {
-            say!("{:>5} not known", face.number);
-            continue;
+        let reach = match reach {
+            Ok(reach) => reach,
+            Err(why) => {
+                say!("{:>5} not known: {why}", face.number);
+                continue;
+            }
         };
         sums = [sums[0] + reach.reachable_mm2, sums[1] + reach.area_mm2];
         let lost: Vec<String> = (reach.unreachable_mm2.iter())

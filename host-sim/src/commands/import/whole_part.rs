@@ -32,6 +32,9 @@ const SCALLOP_MM: f64 = 0.01;
 /// How far the surface of a face goes on beyond it, in step-overs: as for a job.
 const STEP_OVERS_AROUND: f64 = job_file::STEP_OVERS_AROUND;
 
+/// Causes that an error tells.
+const CAUSES: usize = 3;
+
 /// Where the jobs go: a file with all of them, or a folder with one for each face.
 struct Output<'a> {
     path: &'a Path,
@@ -148,14 +151,14 @@ pub(super) fn command(arguments: &Arguments, file: &str, model: &Arc<Model>, out
     write(arguments, file, model, &output, &setup, outcomes)
 }
 
-/// What a ball reaches of each of these faces from above; `None` where a face is not known.
+/// What a ball reaches of each of these faces from above; why not where a face is not known.
 pub(super) fn reaches(
     arguments: &Arguments,
     file: &str,
     model: &Arc<Model>,
     faces: &[&Face],
     radius_mm: f64,
-) -> Vec<Option<FaceReach>> {
+) -> Vec<std::result::Result<FaceReach, String>> {
     let scallop_mm = arguments.scallop_mm.unwrap_or(SCALLOP_MM.min(0.1 * radius_mm));
     let options = Options {
         tolerance_mm: arguments.tolerance,
@@ -172,9 +175,10 @@ pub(super) fn reaches(
     };
     let bar = progress(faces.len() as u64, "reach");
     let found = faces.par_iter().map(|face| {
-        let made = machinable_once(file, model, face.number, &options).ok();
+        let made = machinable_once(file, model, face.number, &options);
         bar.inc(1);
         made.map(|made| asked.reach(face, &made, 64))
+            .map_err(|error| error.what)
     });
     let found = found.collect();
     bar.finish_and_clear();
@@ -201,6 +205,39 @@ fn ordered(arguments: &Arguments, setup: &Setup, outcomes: &[Outcome]) -> (Vec<u
     (order.into_iter().map(|place| with_job[place]).collect(), links_s)
 }
 
+/// Why no face has a job.
+fn without_jobs(arguments: &Arguments, file: &str, outcomes: &[Outcome]) -> Failure {
+    let refused: Vec<String> = (outcomes.iter())
+        .filter_map(|outcome| Some(format!("face {}: {}", outcome.number, outcome.refused.as_ref()?)))
+        .collect();
+    if refused.is_empty() {
+        return Failure::input(
+            format!(
+                "a ball of radius {} mm reaches no face of {file}",
+                arguments.radius_mm.unwrap_or(0.0)
+            ),
+            match arguments.up {
+                Up::Auto => "take a smaller ball; import --list --tool R tells why of each face",
+                _ => "take a smaller ball, or turn another side up with --up auto",
+            },
+        );
+    }
+    let more = match refused.len().saturating_sub(CAUSES) {
+        0 => String::new(),
+        more => format!("; and {more} more"),
+    };
+    Failure::input(
+        format!(
+            "no face of {file} has a job: {}{more}",
+            refused[..refused.len().min(CAUSES)].join("; ")
+        ),
+        match refused.len() == outcomes.len() {
+            true => "mend the faces in the CAD system, or see what import --face N says of each",
+            false => "take a smaller ball for the others, or another side up with --up auto",
+        },
+    )
+}
+
 /// Writes everything.
 fn write(
     arguments: &Arguments,
@@ -211,6 +248,9 @@ fn write(
     mut outcomes: Vec<Outcome>,
 ) -> Result<()> {
     let (order, links_s) = ordered(arguments, setup, &outcomes);
+    if output.is_file && order.is_empty() {
+        return Err(without_jobs(arguments, file, &outcomes));
+    }
     for (place, index) in (1..).zip(&order) {
         let outcome = &mut outcomes[*index];
         let path = output.job(place, outcome.number);
@@ -220,15 +260,6 @@ fn write(
         outcome.job = Some(path);
     }
     if output.is_file {
-        if order.is_empty() {
-            return Err(Failure::input(
-                format!(
-                    "a ball of {} mm reaches no face of {file}",
-                    arguments.radius_mm.unwrap_or(0.0)
-                ),
-                "take a smaller ball, or turn another side up with --up auto",
-            ));
-        }
         let text = program(arguments, file, output, setup, &order, &outcomes);
         whole::write(output.path, text.as_bytes(), arguments.force)?;
     }

@@ -5,7 +5,7 @@
 //! average of the k-th derivative over k bases. So
 //!
 //! - it is never above the derivative's largest magnitude, whatever the base, and
-//! - the positions' error adds at most 20, 40 or 80 nm over `(nT)^k`: for the jerk over 1 ms 80 000 mm/s^3, over 5 ms 640.
+//! - the positions' error adds at most 20, 40 or 80 nm over `(nT)^k`: for the jerk over 1 ms 80 000 mm/s^3, over 6 ms 370.
 //!
 //! ```text
 //! bases 1, 2, 3, 4, 6, 8, 12 .. periods ──► the largest difference less its error: surely reached ──► above the limit: violated
@@ -14,7 +14,7 @@
 //!
 //! A violation of any kind raises the figure: a lasting one over long bases, where the error vanishes; a break over short ones, where it is
 //! large. What escapes is a break so small that over the judged base it averages out: a step of the acceleration by less than 1.4 J nT, say
-//! (140 mm/s^2 at 20 000 mm/s^3). Where even a step by the whole acceleration limit would average out, the base is too long for a verdict.
+//! (168 mm/s^2 at 20 000 mm/s^3). Where even a step by the whole acceleration limit would average out, the base is too long for a verdict.
 
 use crate::Verdict;
 use job::{AXES, AxisLimits, MachineSpec};

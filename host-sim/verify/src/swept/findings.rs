@@ -252,8 +252,16 @@ impl SweptResult {
         }
     }
 
+    /// Whether the run has a sample.
+    #[must_use]
+    pub fn has_samples(&self) -> bool {
+        self.axes.extent_mm.is_some()
+    }
+
     fn judge_gouge(&self, job: &Job) -> Verdict {
-        if self.gouge_max_mm() > gouge_allowed_mm(job) {
+        if !self.has_samples() {
+            Verdict::Unknown
+        } else if self.gouge_max_mm() > gouge_allowed_mm(job) {
             Verdict::Violated
         } else if self.gouge_bound_mm.max(self.gouge_floor_mm) <= self.gouge_seen_mm(job) {
             Verdict::Met
@@ -325,6 +333,9 @@ impl SweptResult {
     }
 
     fn failing(&self, job: &Job) -> Vec<String> {
+        if !self.has_samples() {
+            return vec!["nothing is measured: the run has no sample".to_owned()];
+        }
         let mut failures: Vec<String> = self.scallop_failure(job).into_iter().collect();
         if self.gouge_verdict == Verdict::Unknown {
             failures.push(format!(
@@ -368,7 +379,7 @@ impl SweptResult {
             .filter(|concave| concave.radius_mm < job.radius_mm)
         {
             warnings.push(format!(
-                "the surface has a concave radius of {:.4} mm at u = {:.6}, v = {:.6}, where a ball of {} mm does not fit",
+                "the surface has a concave radius of {:.4} mm at u = {:.6}, v = {:.6}, where a ball of radius {} mm does not fit",
                 concave.radius_mm, concave.u, concave.v, job.radius_mm
             ));
         }

@@ -53,6 +53,7 @@ impl Asked<'_> {
     pub(super) fn of<T>(
         &self,
         face: &Face,
+        sign: f64,
         made: &MachinableFace,
         take: impl FnOnce(&Request<'_>) -> T,
     ) -> T {
@@ -67,7 +68,7 @@ impl Asked<'_> {
             trimmed: made.trimmed.as_ref().unwrap_or(&whole),
             face: placed.as_ref().unwrap_or(face),
             placement: &Placement::IDENTITY,
-            sign: face.sense,
+            sign,
             tool: self.tool,
             scallop_mm: self.scallop_mm,
             steepest_deg: job_file::STEEPEST_DEG,
@@ -77,8 +78,22 @@ impl Asked<'_> {
         take(&request)
     }
 
+    /// The side of a face that is machined: out of the material. Of one that bounds no solid the file does not tell where that is: the side of which more
+    /// is reached.
+    fn sign(&self, face: &Face, made: &MachinableFace) -> f64 {
+        if face.solid {
+            return face.sense;
+        }
+        let reached = |sign| self.of(face, sign, made, |request| request.reach(LOOK_SIDE)).reachable_mm2;
+        if reached(-face.sense) > reached(face.sense) {
+            -face.sense
+        } else {
+            face.sense
+        }
+    }
+
     pub(super) fn reach(&self, face: &Face, made: &MachinableFace, side: usize) -> FaceReach {
-        let found = self.of(face, made, |request| request.reach(side));
+        let found = self.of(face, self.sign(face, made), made, |request| request.reach(side));
         FaceReach {
             area_mm2: found.area_mm2,
             reachable_mm2: found.reachable_mm2,
@@ -175,6 +190,12 @@ fn with_surface(
     asked: &Asked<'_>,
     folder: &Path,
 ) -> Outcome {
+    let face = &Face {
+        sense: asked.sign(face, made),
+        // From here on its side is known.
+        solid: true,
+        ..face.clone()
+    };
     let mut outcome = Outcome {
         parameters: made.parameters,
         made: Some(Arc::clone(made)),
@@ -244,7 +265,7 @@ fn settle(
     };
     let surface = oracle::Surface::new(&job.surface);
     let inside = Inside::new(&region.loops);
-    let mut places = asked.of(face, made, |request| {
+    let mut places = asked.of(face, face.sense, made, |request| {
         request.places(&Inside::new(request.trimmed), REACH_SIDE)
     });
     places.retain(|(place, _)| inside.contains(*place));

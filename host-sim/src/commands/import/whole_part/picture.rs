@@ -38,7 +38,8 @@ pub(super) fn cells(
         .region
         .as_ref()
         .map_or([].as_slice(), |(region, _)| region.loops.as_slice());
-    let cells = asked.of(face, made, |request| request.picture(loops, side));
+    let sign = if found.side == "-" { -1.0 } else { 1.0 };
+    let cells = asked.of(face, sign, made, |request| request.picture(loops, side));
     cells
         .into_iter()
         .map(|(state, corners)| (tint(state), corners.map(|corner| corner.to_array())))

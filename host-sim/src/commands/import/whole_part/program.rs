@@ -20,7 +20,7 @@ pub(super) fn program(
     let path = relative(&arguments.file, output.path).unwrap_or_default();
     let radius_mm = arguments.radius_mm.unwrap_or(0.0);
     let mut out = format!(
-        "# {} faces of {}, each with the region that a ball of {radius_mm} mm reaches, in this order. One alone: {}#{}\n\n\
+        "# {} faces of {}, each with the region that a ball of radius {radius_mm} mm reaches, in this order. One alone: {}#{}\n\n\
          # What must not be cut, and what the faces are of.\n[part]\npath = {path:?}\n",
         order.len(),
         job::one_line(file),

@@ -127,7 +127,8 @@ pub(super) fn print(
     if sums.unknown > 0 {
         say!("  {} faces are not known", sums.unknown);
     }
-    let passes_s: f64 = order.iter().map(|index| outcomes[*index].passes_s()).sum();
+    // A sum of nothing is -0.
+    let passes_s = 0.0 + order.iter().map(|index| outcomes[*index].passes_s()).sum::<f64>();
     say!(
         "  passes       about {:.1} min; `verify` tells the time",
         passes_s / 60.0
