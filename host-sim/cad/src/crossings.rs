@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use super::surface::{Periodic, Surface};
+use super::surface::Periodic;
 use super::trim::Polygon;
 use glam::DVec3;
 
@@ -17,7 +17,7 @@ pub(super) struct Crossing {
 type Segment = [[f64; 2]; 2];
 
 /// The first crossing that is deeper than this, mm.
-pub(super) fn crossing(surface: &Surface, polygons: &[Polygon], deeper_mm: f64) -> Option<Crossing> {
+pub(super) fn crossing(on: &Periodic<'_>, polygons: &[Polygon], deeper_mm: f64) -> Option<Crossing> {
     let edges: Vec<Segment> = polygons
         .iter()
         .flat_map(|polygon| {
@@ -56,7 +56,6 @@ pub(super) fn crossing(surface: &Surface, polygons: &[Polygon], deeper_mm: f64) 
             }
         }
     }
-    let on = Periodic::new(surface);
     let mut seen = HashSet::new();
     for bucket in &buckets {
         for (at, first) in bucket.iter().enumerate() {

@@ -5,15 +5,23 @@ use super::exact::joints;
 use super::spline::{Axis, Pole, Side, SplineSurface};
 use super::surface::{Periodic, Surface};
 use glam::DVec3;
+use interp_core::STORE_WORDS;
+use interp_core::surface::POLYNOMIAL_WORDS;
 
+/// Nonzero basis functions of a fit at a parameter: it is cubic.
+const ORDER: usize = 4;
 /// Largest number of spans in one direction: the data of more would not fit a job.
 const SPANS_MAX: usize = 310;
+/// Most patches that the board's store holds: a fit with more is refused, however near it is.
+const PATCHES_MAX: usize = STORE_WORDS / POLYNOMIAL_WORDS;
 /// Number of lines across, on which the error in one direction is measured.
 const LINES: usize = 17;
 /// Interior points per span at which the error on a line is measured.
 const PLACES: usize = 6;
 /// Points per side of a patch at which the deviation of the fit is measured.
 const DENSE: usize = 9;
+/// Those of a fit that is refused, to tell of how many patches one would be: some of the same points.
+const SPARSE: usize = 3;
 /// Share of the tolerance for each direction; reduced if both together exceed the tolerance.
 const SHARE: f64 = 0.9;
 /// Greatest jump of a first derivative, as a share of it, and of a second one over the range, as a share of the first, that is rounding.
@@ -42,6 +50,8 @@ pub struct Deviation {
 pub(super) enum FitError {
     /// The tolerance needs more spans than [`SPANS_MAX`].
     TooManySpans,
+    /// This fit is within the tolerance, as far as [`SPARSE`] tells, and has more than [`PATCHES_MAX`].
+    TooManyPatches(SplineSurface),
     /// The surface has no point at some parameters.
     NotFinite,
 }
@@ -65,7 +75,7 @@ impl Collocation {
             .collect();
         let mut factors = vec![vec![0.0; n]; n];
         for (row, &t) in factors.iter_mut().zip(&places) {
-            let (first, basis) = axis.basis(t, Side::Above);
+            let (first, basis) = axis.basis::<ORDER>(t, Side::Above);
             row[first..=first + degree].copy_from_slice(&basis[0][..=degree]);
         }
         let order = decompose(&mut factors, degree);
@@ -307,7 +317,7 @@ fn divided(breaks: &[(f64, usize)], parts: &[usize]) -> Vec<(f64, usize)> {
 }
 
 fn on_curve(axis: &Axis, poles: &[DVec3], t: f64) -> DVec3 {
-    let (first, basis) = axis.basis(t, Side::Above);
+    let (first, basis) = axis.basis::<ORDER>(t, Side::Above);
     let acting = poles[first..=first + axis.degree].iter().zip(&basis[0]);
     acting.map(|(pole, share)| share * pole).sum()
 }
@@ -337,14 +347,14 @@ fn interpolated(surface: &Surface, axes: [Axis; 2]) -> Result<SplineSurface, Fit
     })
 }
 
-/// Largest distance and angle between a surface and its fit, on a grid in each patch of the fit.
-pub(super) fn deviation(surface: &Surface, fit: &SplineSurface) -> Deviation {
+/// Largest distance and angle between a surface and its fit, at this many points per side of each patch of the fit.
+fn deviation(surface: &Surface, fit: &SplineSurface, each: usize) -> Deviation {
     let places = |k: usize| -> Vec<f64> {
         let breaks = fit.axes[k].breaks();
         let spans = breaks.windows(2);
-        let inside = |i: usize| (i as f64 + 0.5) / DENSE as f64;
+        let inside = |i: usize| (i as f64 + 0.5) / each as f64;
         spans
-            .flat_map(|span| (0..DENSE).map(move |i| span[0] + (span[1] - span[0]) * inside(i)))
+            .flat_map(|span| (0..each).map(move |i| span[0] + (span[1] - span[0]) * inside(i)))
             .collect()
     };
     let (us, vs) = (places(0), places(1));
@@ -392,9 +402,14 @@ pub(super) fn fit(
         };
         let axes = [axis(0)?, axis(1)?];
         let fit = interpolated(surface, axes)?;
-        let measured = deviation(surface, &fit);
+        let is_too_large = fit.patches() > PATCHES_MAX;
+        let measured = deviation(surface, &fit, if is_too_large { SPARSE } else { DENSE });
         if measured.max_mm <= tolerance_mm {
-            return Ok((fit, measured));
+            return if is_too_large {
+                Err(FitError::TooManyPatches(fit))
+            } else {
+                Ok((fit, measured))
+            };
         }
         share *= 0.75;
     }

@@ -4,7 +4,7 @@ use glam::DVec3;
 use std::f64::consts::PI;
 
 use super::curve::Curve;
-use super::surface::Surface;
+use super::surface::{Periodic, Surface};
 
 /// Seeds per side of each patch in the search of the nearest point on a B-spline surface.
 const SEEDS: usize = 3;
@@ -25,55 +25,14 @@ const NEAREST_MM: f64 = 1e-10;
 const HALVINGS: i32 = 16;
 
 impl Surface {
-    /// Parameters of the point of the surface nearest to `to`, and its distance, mm. `near`: initial guess; on a periodic
-    /// surface the result is the one nearest to the guess.
+    /// As [`Periodic::invert`], for a single point.
     #[must_use]
     pub fn invert(&self, to: DVec3, near: Option<[f64; 2]>) -> ([f64; 2], f64) {
-        let mut found = match near {
-            Some(near) if !self.closed_form() => self.refined(near, to),
-            _ => self.sought(to),
-        };
-        if near.is_some() && !self.closed_form() && !found.is_meant() {
-            // Points on the surface are found from the guess; if that fails, the whole surface is searched.
-            let afresh = self.sought(to);
-            if afresh.off_mm < 0.5 * found.off_mm {
-                found = afresh;
-            }
-        }
-        let mut found = (found.place, found.off_mm);
-        if let Some(near) = near {
-            for (k, period) in self.periods().into_iter().enumerate() {
-                if let Some(period) = period {
-                    found.0[k] += period * ((near[k] - found.0[k]) / period).round();
-                }
-            }
-        }
-        found
+        Periodic::new(self).invert(to, near)
     }
 
     fn closed_form(&self) -> bool {
         !matches!(self, Self::Spline(_) | Self::Ruled { .. } | Self::Offset { .. })
-    }
-
-    /// The place nearest to a point, sought on the whole surface.
-    fn sought(&self, to: DVec3) -> Found {
-        if let Some(seed) = self.seed(to) {
-            return self.refined(seed, to);
-        }
-        let [first, others @ ..] = &self.seeds(to)[..] else {
-            unreachable!("a grid has a nearest seed")
-        };
-        let mut best = self.refined(*first, to);
-        for seed in others {
-            if best.is_meant() {
-                break;
-            }
-            let found = self.refined(*seed, to);
-            if found.off_mm < best.off_mm {
-                best = found;
-            }
-        }
-        best
     }
 
     /// Parameters of a point of an elementary surface, a revolution or an extrusion; `None` for other surfaces, which have [`Self::seeds`].
@@ -113,11 +72,19 @@ impl Surface {
                 y,
                 z,
                 major,
-                ..
+                minor,
             } => {
                 let from = to - *center;
                 let (a, b, c) = (share(from, *x), share(from, *y), share(from, *z));
-                [b.atan2(a), c.atan2(a.hypot(b) - major)]
+                let out = a.hypot(b);
+                // A tube that is wider than its ring goes on beyond the axis: the nearer of its two circles in the plane of the point and the axis.
+                let off = |out: f64| ((out - major).hypot(c) - minor).abs();
+                let (turn, out) = if off(-out) < off(out) {
+                    (PI, -out)
+                } else {
+                    (0.0, out)
+                };
+                [b.atan2(a) + turn, c.atan2(out - major)]
             }
             Self::Revolution {
                 profile,
@@ -193,25 +160,74 @@ impl Surface {
         }
         least.into_iter().map(|(_, place)| place).collect()
     }
+}
+
+impl Periodic<'_> {
+    /// Parameters of the point of the surface nearest to `to`, and its distance, mm. `near`: initial guess; on a periodic
+    /// surface the result is the one nearest to the guess.
+    #[must_use]
+    pub fn invert(&self, to: DVec3, near: Option<[f64; 2]>) -> ([f64; 2], f64) {
+        let mut found = match near {
+            Some(near) if !self.surface.closed_form() => self.refined(near, to),
+            _ => self.sought(to),
+        };
+        if near.is_some() && !self.surface.closed_form() && !found.is_meant() {
+            // Points on the surface are found from the guess; if that fails, the whole surface is searched.
+            let afresh = self.sought(to);
+            if afresh.off_mm < 0.5 * found.off_mm {
+                found = afresh;
+            }
+        }
+        let mut found = (found.place, found.off_mm);
+        if let Some(near) = near {
+            for (k, period) in self.periods.into_iter().enumerate() {
+                if let Some(period) = period {
+                    found.0[k] += period * ((near[k] - found.0[k]) / period).round();
+                }
+            }
+        }
+        found
+    }
+
+    /// The place nearest to a point, sought on the whole surface.
+    fn sought(&self, to: DVec3) -> Found {
+        if let Some(seed) = self.surface.seed(to) {
+            return self.refined(seed, to);
+        }
+        let [first, others @ ..] = &self.surface.seeds(to)[..] else {
+            unreachable!("a grid has a nearest seed")
+        };
+        let mut best = self.refined(*first, to);
+        for seed in others {
+            if best.is_meant() {
+                break;
+            }
+            let found = self.refined(*seed, to);
+            if found.off_mm < best.off_mm {
+                best = found;
+            }
+        }
+        best
+    }
 
     /// Newton's method on the distance, within the domain; no step increases the distance.
     fn refined(&self, start: [f64; 2], to: DVec3) -> Found {
-        let (domain, periods) = (self.domain(), self.periods());
+        let (surface, domain, periods) = (self.surface, self.domain, self.periods);
         let held = |place: [f64; 2]| -> [f64; 2] {
             std::array::from_fn(|k| match (domain[k], periods[k]) {
                 (Some(range), None) => place[k].clamp(range[0], range[1]),
                 // The parameters of a closed B-spline wrap at its seam.
-                (Some(range), Some(period)) if matches!(self, Self::Spline(_)) => {
+                (Some(range), Some(period)) if matches!(surface, Surface::Spline(_)) => {
                     range[0] + (place[k] - range[0]).rem_euclid(period)
                 }
                 _ => place[k],
             })
         };
         let mut place = held(start);
-        let mut gap = self.at(place[0], place[1]).point - to;
+        let mut gap = surface.at(place[0], place[1]).point - to;
         let mut is_nearest = false;
         for _ in 0..STEPS {
-            let at = self.at(place[0], place[1]);
+            let at = surface.at(place[0], place[1]);
             gap = at.point - to;
             let slope = [gap.dot(at.u), gap.dot(at.v)];
             let near = [at.u.length_squared(), at.u.dot(at.v), at.v.length_squared()];
@@ -239,7 +255,7 @@ impl Surface {
                 (0..HALVINGS).find_map(|k| {
                     let share = 0.5_f64.powi(k);
                     let next = held([place[0] + share * step[0], place[1] + share * step[1]]);
-                    let new = self.at(next[0], next[1]).point - to;
+                    let new = surface.at(next[0], next[1]).point - to;
                     (new.length_squared() < gap.length_squared()).then_some((next, new))
                 })
             });

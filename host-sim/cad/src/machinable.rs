@@ -3,7 +3,7 @@
 use super::aspect::with_even_patches;
 use super::edges::along_edges;
 use super::exact::exact;
-use super::fit::{Deviation, FitError, Knots, deviation, fit};
+use super::fit::{Deviation, FitError, Knots, fit};
 use super::plane::suited;
 use super::removal::without_needless_knots;
 use super::spline::SplineSurface;
@@ -226,7 +226,7 @@ fn grown(surface: &Surface, rectangle: [[f64; 2]; 2], around_mm: f64) -> [[f64; 
     let on = Periodic::new(surface);
     std::array::from_fn(|k| {
         let [mut low, mut high] = rectangle[k];
-        if let Some(period) = surface.periods()[k]
+        if let Some(period) = on.periods[k]
             && high - low >= period * (1.0 - 1e-9)
         {
             return [low, high];
@@ -242,21 +242,13 @@ fn grown(surface: &Surface, rectangle: [[f64; 2]; 2], around_mm: f64) -> [[f64; 
             around_mm / speed(at).max(0.3 * speed(middle)).max(f64::MIN_POSITIVE)
         };
         (low, high) = (low - by(low), high + by(high));
-        match (surface.domain()[k], surface.periods()[k]) {
-            (_, Some(period)) if high - low > period => [middle[k] - 0.5 * period, middle[k] + 0.5 * period],
-            (Some([least, most]), None) => [low.max(least), high.min(most)],
-            _ => match surface {
-                Surface::Cone { radius, slope, .. } if k == 1 && *slope != 0.0 => {
-                    let apex = -radius / slope;
-                    if middle[1] < apex {
-                        [low, high.min(apex)]
-                    } else {
-                        [low.max(apex), high]
-                    }
-                }
-                _ => [low, high],
-            },
-        }
+        (low, high) = match (on.domain[k], on.periods[k]) {
+            (_, Some(period)) if high - low > period => (middle[k] - 0.5 * period, middle[k] + 0.5 * period),
+            (Some([least, most]), None) => (low.max(least), high.min(most)),
+            _ => (low, high),
+        };
+        let [least, most] = surface.between_points(k, middle[k]);
+        [low.max(least), high.min(most)]
     })
 }
 
@@ -269,33 +261,28 @@ fn converted(
     rectangle: [[f64; 2]; 2],
     name: &str,
 ) -> Result<MachinableFace, CadError> {
+    let exactly = |nurbs: NurbsSpec, patches| MachinableFace {
+        nurbs,
+        form: Form::Exact,
+        outline: outline.clone(),
+        trimmed: None,
+        patches,
+        by_edges: false,
+        parameters: options.parameters,
+    };
     let mut why_fitted = "it has no exact form".to_owned();
-    let mut streamed = None;
+    let mut larger = None;
     if let Some(spline) = exact(&face.surface, rectangle) {
         let spline = without_needless_knots(&spline);
         let degree = spline.axes.iter().map(|axis| axis.degree).max().unwrap_or(0);
         if degree <= DEGREE_EXACT {
-            let exact = |nurbs: NurbsSpec, patches| MachinableFace {
-                nurbs,
-                form: Form::Exact,
-                outline: outline.clone(),
-                trimmed: None,
-                patches,
-                by_edges: false,
-                parameters: options.parameters,
-            };
             // Even patches where there is room for them.
             for spline in with_even_patches(&spline).into_iter().chain([spline]) {
                 let nurbs = nurbs(&spline);
                 let surface = centred(&nurbs);
                 match patch_count(&surface) {
-                    Ok(patches) => return Ok(exact(nurbs, patches)),
-                    Err(why) => {
-                        why_fitted = why;
-                        streamed = streamed_patch_count(&surface)
-                            .ok()
-                            .map(|patches| exact(nurbs, patches));
-                    }
+                    Ok(patches) => return Ok(exactly(nurbs, patches)),
+                    Err(why) => (why_fitted, larger) = (why, Some((nurbs, surface))),
                 }
             }
         } else {
@@ -303,7 +290,13 @@ fn converted(
         }
     }
     // What the store holds at once needs no host while it runs: a fit is taken before a larger surface.
-    fitted(file, face, options, outline, rectangle, why_fitted, name).or_else(|error| streamed.ok_or(error))
+    fitted(file, face, options, outline, rectangle, why_fitted, name).or_else(|error| {
+        let streamed = larger.and_then(|(nurbs, surface)| {
+            let patches = streamed_patch_count(&surface).ok()?;
+            Some(exactly(nurbs, patches))
+        });
+        streamed.ok_or(error)
+    })
 }
 
 fn fitted(
@@ -325,28 +318,31 @@ fn fitted(
             ),
         )
     };
-    let made = |knots: Knots| {
-        let made = fit(&face.surface, rectangle, options.tolerance_mm, knots);
-        let (spline, _) = made.map_err(|error| match error {
-            FitError::TooManySpans => too_fine(format!(
-                "no fit within {} mm has few enough spans",
-                options.tolerance_mm
-            )),
-            FitError::NotFinite => CadError::face(
-                file,
-                format!("{name}: it has no point at some of its parameters"),
-                "choose another face; import --list shows them",
-            ),
-        })?;
-        let nurbs = nurbs(&spline);
+    let counted = |spline: &SplineSurface| {
+        let nurbs = nurbs(spline);
         let patches = patch_count(&centred(&nurbs))
             .map_err(|still| too_fine(format!("of a fit within {} mm {still}", options.tolerance_mm)))?;
-        Ok((spline, nurbs, patches))
+        Ok((nurbs, patches))
+    };
+    let too_many_spans = || {
+        too_fine(format!(
+            "no fit within {} mm has few enough spans",
+            options.tolerance_mm
+        ))
+    };
+    let made = |knots: Knots| match fit(&face.surface, rectangle, options.tolerance_mm, knots) {
+        Ok((spline, deviation)) => counted(&spline).map(|(nurbs, patches)| (nurbs, patches, deviation)),
+        Err(FitError::TooManyPatches(spline)) => Err(counted(&spline).err().unwrap_or_else(too_many_spans)),
+        Err(FitError::TooManySpans) => Err(too_many_spans()),
+        Err(FitError::NotFinite) => Err(CadError::face(
+            file,
+            format!("{name}: it has no point at some of its parameters"),
+            "choose another face; import --list shows them",
+        )),
     };
     // A surface of many short pieces may be smoother than its knots tell.
-    let (spline, nurbs, patches) =
+    let (nurbs, patches, deviation) =
         made(Knots::OfSurface).or_else(|error| made(Knots::Fewest).map_err(|_: CadError| error))?;
-    let deviation = deviation(&face.surface, &spline);
     Ok(MachinableFace {
         nurbs,
         form: Form::Fitted { why, deviation },

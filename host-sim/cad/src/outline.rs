@@ -1,7 +1,7 @@
 //! The boundary of a face in the parameters of its surface: a rectangle, or a trimmed region with its bounding rectangle.
 
 use super::exact::joints;
-use super::surface::{Periodic, Surface};
+use super::surface::Periodic;
 use super::{Boundary, Edge, Face};
 
 /// Tolerance of an edge on an iso-parametric line, mm. Edges in files are accurate to 1e-3 to 1e-7 mm.
@@ -54,9 +54,9 @@ pub(super) fn winding(paths: &[Path]) -> Winding {
 }
 
 /// The loops of a face in parameters. Those that do not wind around a closed surface lie in the turn of the largest one.
-pub(super) fn paths(surface: &Surface, loops: &[Vec<Edge>]) -> Vec<Path> {
-    let mut paths: Vec<Path> = loops.iter().map(|edges| trace(surface, edges)).collect();
-    let periods = surface.periods();
+pub(super) fn paths(on: &Periodic<'_>, loops: &[Vec<Edge>]) -> Vec<Path> {
+    let mut paths: Vec<Path> = loops.iter().map(|edges| trace(on, edges)).collect();
+    let periods = on.periods;
     for path in &mut paths {
         path.seam = (0..2).find(|k| {
             let [low, high] = path.extent(*k);
@@ -64,7 +64,7 @@ pub(super) fn paths(surface: &Surface, loops: &[Vec<Edge>]) -> Vec<Path> {
                 .edges
                 .iter()
                 .flatten()
-                .map(|place| speed(surface, *place, *k))
+                .map(|place| speed(on, *place, *k))
                 .fold(0.0, f64::max);
             periods[*k].is_some() && path.winding == [0.0; 2] && (high - low) * fastest <= FOLLOWS_MM
         });
@@ -104,8 +104,8 @@ pub(super) fn paths(surface: &Surface, loops: &[Vec<Edge>]) -> Vec<Path> {
 }
 
 /// Whether the loops of a face on a closed surface are its holes alone: the face is on the outer side of the largest.
-pub(super) fn complementary(surface: &Surface, paths: &[Path], sense: f64) -> bool {
-    let (periods, domain) = (surface.periods(), surface.domain());
+pub(super) fn complementary(on: &Periodic<'_>, paths: &[Path], sense: f64) -> bool {
+    let (periods, domain) = (on.periods, on.domain);
     let closed = (0..2).any(|k| periods[k].is_some()) && domain.iter().all(Option::is_some);
     let largest = paths
         .iter()
@@ -139,19 +139,19 @@ impl Path {
 }
 
 /// Length of the derivative by parameter k, mm per unit.
-fn speed(surface: &Surface, place: [f64; 2], k: usize) -> f64 {
-    let at = Periodic::new(surface).at(place[0], place[1]);
+fn speed(on: &Periodic<'_>, place: [f64; 2], k: usize) -> f64 {
+    let at = on.at(place[0], place[1]);
     if k == 0 { at.u } else { at.v }.length()
 }
 
 /// Scale of the parameter: its period, its range, or 1.
-fn reach(surface: &Surface, k: usize) -> f64 {
-    let range = surface.domain()[k].map_or(1.0, |[low, high]| high - low);
-    surface.periods()[k].unwrap_or(range)
+fn reach(on: &Periodic<'_>, k: usize) -> f64 {
+    let range = on.domain[k].map_or(1.0, |[low, high]| high - low);
+    on.periods[k].unwrap_or(range)
 }
 
-fn trace(surface: &Surface, edges: &[Edge]) -> Path {
-    let periods = surface.periods();
+fn trace(on: &Periodic<'_>, edges: &[Edge]) -> Path {
+    let periods = on.periods;
     let mut path = Path {
         edges: Vec::new(),
         winding: [0.0; 2],
@@ -163,9 +163,9 @@ fn trace(surface: &Surface, edges: &[Edge]) -> Path {
         let mut places: Vec<[f64; 2]> = Vec::with_capacity(edge.len());
         let mut polar = Vec::with_capacity(edge.len());
         for point in edge {
-            let (mut place, off_mm) = surface.invert(*point, near);
+            let (mut place, off_mm) = on.invert(*point, near);
             path.off_mm = path.off_mm.max(off_mm);
-            let on_pole = [0, 1].map(|k| speed(surface, place, k) * reach(surface, k) < POLE_MM);
+            let on_pole = [0, 1].map(|k| speed(on, place, k) * reach(on, k) < POLE_MM);
             for k in 0..2 {
                 if let Some(near) = near.filter(|_| on_pole[k]) {
                     let near: [f64; 2] = near;
@@ -201,16 +201,13 @@ fn off_the_pole(places: &mut [[f64; 2]], polar: &[[bool; 2]], k: usize) {
 }
 
 /// Whether the edge lies on a line of constant parameter k.
-pub(super) fn constant(surface: &Surface, edge: &[[f64; 2]], k: usize) -> bool {
+pub(super) fn constant(on: &Periodic<'_>, edge: &[[f64; 2]], k: usize) -> bool {
     let [low, high] = edge
         .iter()
         .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], place| {
             [low.min(place[k]), high.max(place[k])]
         });
-    let fastest = edge
-        .iter()
-        .map(|place| speed(surface, *place, k))
-        .fold(0.0, f64::max);
+    let fastest = edge.iter().map(|place| speed(on, *place, k)).fold(0.0, f64::max);
     0.5 * (high - low) * fastest <= FOLLOWS_MM
 }
 
@@ -244,17 +241,27 @@ pub fn outline(face: &Face) -> Result<Outline, String> {
         }
         Boundary::Loops(loops) => loops,
     };
-    let paths = paths(surface, loops);
+    let on = Periodic::new(surface);
+    let paths = paths(&on, loops);
     let off_mm = paths.iter().map(|path| path.off_mm).fold(0.0, f64::max);
     let mut rectangle = around(&paths);
-    let holes_alone = complementary(surface, &paths, face.sense);
+    let holes_alone = complementary(&on, &paths, face.sense);
     let trimmed = match winding(&paths) {
         Winding::None if holes_alone => {
-            rectangle = natural()?;
+            let whole = natural()?;
+            rectangle = std::array::from_fn(|k| {
+                let middle = 0.5 * (rectangle[k][0] + rectangle[k][1]);
+                let points = surface.between_points(k, middle);
+                if points.iter().all(|end| end.is_finite()) {
+                    points
+                } else {
+                    whole[k]
+                }
+            });
             Some(format!("it has {} holes", paths.len()))
         }
-        Winding::None => single(surface, &paths, &mut rectangle),
-        Winding::Along(k) => belt(surface, &paths, k, face.sense, &mut rectangle)?,
+        Winding::None => single(&on, &paths, &mut rectangle),
+        Winding::Along(k) => belt(&on, &paths, k, face.sense, &mut rectangle)?,
         Winding::Both => Some("its boundary winds around the surface both ways".to_owned()),
     };
     if trimmed.is_some() && !holes_alone {
@@ -263,7 +270,7 @@ pub fn outline(face: &Face) -> Result<Outline, String> {
             *range = [range[0] - sag, range[1] + sag];
         }
     }
-    let rectangle = settled(surface, rectangle);
+    let rectangle = settled(&on, rectangle);
     let trimmed = trimmed.or_else(|| {
         (off_mm > 10.0 * FOLLOWS_MM).then(|| format!("its boundary lies {off_mm:.4} mm off its surface"))
     });
@@ -291,11 +298,11 @@ fn around(paths: &[Path]) -> [[f64; 2]; 2] {
 
 /// A face whose loops do not wind around the surface: a rectangle if it has one loop of four iso-parametric lines. Returns the
 /// reason if not.
-fn single(surface: &Surface, paths: &[Path], rectangle: &mut [[f64; 2]; 2]) -> Option<String> {
+fn single(on: &Periodic<'_>, paths: &[Path], rectangle: &mut [[f64; 2]; 2]) -> Option<String> {
     let mut whole_turn = false;
     for path in paths {
         if let Some(k) = path.seam
-            && let Some(period) = surface.periods()[k]
+            && let Some(period) = on.periods[k]
         {
             // The loop consists of the seam alone: the face covers a whole period.
             let low = path.extent(k)[0];
@@ -307,7 +314,7 @@ fn single(surface: &Surface, paths: &[Path], rectangle: &mut [[f64; 2]; 2]) -> O
         return Some(format!("it has {} holes", paths.len().saturating_sub(1)));
     };
     for (number, edge) in path.edges.iter().enumerate() {
-        if !(0..2).any(|k| constant(surface, edge, k)) {
+        if !(0..2).any(|k| constant(on, edge, k)) {
             return Some(format!(
                 "its boundary's edge {} is not an iso-parametric line",
                 number + 1
@@ -325,14 +332,14 @@ fn single(surface: &Surface, paths: &[Path], rectangle: &mut [[f64; 2]; 2]) -> O
 /// A face whose loops wind around the surface in parameter k: a belt between two lines, or between a line and a degenerate
 /// boundary.
 fn belt(
-    surface: &Surface,
+    on: &Periodic<'_>,
     paths: &[Path],
     k: usize,
     sense: f64,
     rectangle: &mut [[f64; 2]; 2],
 ) -> Result<Option<String>, String> {
     let across = 1 - k;
-    let Some(period) = surface.periods()[k] else {
+    let Some(period) = on.periods[k] else {
         return Err("its boundary winds around a surface that is not closed".to_owned());
     };
     let start = paths
@@ -349,9 +356,9 @@ fn belt(
             continue;
         }
         for edge in &path.edges {
-            if constant(surface, edge, across) {
+            if constant(on, edge, across) {
                 bounds.push(edge[0][across]);
-            } else if !constant(surface, edge, k) {
+            } else if !constant(on, edge, k) {
                 trimmed = Some("its boundary is not an iso-parametric line".to_owned());
             }
         }
@@ -361,12 +368,13 @@ fn belt(
     if turning.len() == 1 {
         // A single line: the face is to its left, seen against the normal of the face.
         let left = turning[0].winding[k] * sense * if k == 0 { 1.0 } else { -1.0 };
-        let end = surface.domain()[across]
-            .map(|range| if left > 0.0 { range[1] } else { range[0] })
-            .or_else(|| match surface {
-                Surface::Cone { radius, slope, .. } if *slope != 0.0 => Some(-radius / slope),
-                _ => None,
-            });
+        let toward = usize::from(left > 0.0);
+        // The point in which it meets its axis there, or at all, or else its last line.
+        let points = on.surface.between_points(across, 0.5 * (low + high));
+        let end = [points[toward], points[1 - toward]]
+            .into_iter()
+            .find(|end| end.is_finite())
+            .or(on.domain[across].map(|range| range[toward]));
         let Some(end) = end else {
             return Err("its boundary leaves it unbounded".to_owned());
         };
@@ -378,7 +386,7 @@ fn belt(
     // Further loops inside of the belt.
     let [low, high] = rectangle[across];
     let ends = |bound: &f64| {
-        let slack = FOLLOWS_MM / speed(surface, [start, *bound], across).max(f64::MIN_POSITIVE);
+        let slack = FOLLOWS_MM / speed(on, [start, *bound], across).max(f64::MIN_POSITIVE);
         (bound - low).abs() <= slack || (bound - high).abs() <= slack
     };
     if trimmed.is_none() && !bounds.iter().all(ends) {
@@ -388,12 +396,12 @@ fn belt(
 }
 
 /// The rectangle within the domain of the surface; ends that differ from those of the domain by rounding are set to them.
-fn settled(surface: &Surface, rectangle: [[f64; 2]; 2]) -> [[f64; 2]; 2] {
+fn settled(on: &Periodic<'_>, rectangle: [[f64; 2]; 2]) -> [[f64; 2]; 2] {
     let middle = rectangle.map(|[low, high]| 0.5 * (low + high));
     std::array::from_fn(|k| {
         let [mut low, mut high] = rectangle[k];
-        let slack = FOLLOWS_MM / speed(surface, middle, k).max(f64::MIN_POSITIVE);
-        let (domain, period) = (surface.domain()[k], surface.periods()[k]);
+        let slack = FOLLOWS_MM / speed(on, middle, k).max(f64::MIN_POSITIVE);
+        let (domain, period) = (on.domain[k], on.periods[k]);
         if let (Some(range), Some(period)) = (domain, period) {
             // Shifted by whole periods, so that it begins within the domain.
             let turns = ((low - range[0] + slack.min(0.25 * period)) / period).floor();
@@ -402,22 +410,26 @@ fn settled(surface: &Surface, rectangle: [[f64; 2]; 2]) -> [[f64; 2]; 2] {
                 high = low + period;
             }
         }
+        let snap = |x: f64, range: [f64; 2]| {
+            let mut ends = range.into_iter();
+            ends.find(|end| (x - end).abs() <= slack).unwrap_or(x)
+        };
         if let Some(range) = domain {
-            let snap = |x: f64| {
-                range
-                    .into_iter()
-                    .find(|end| (x - end).abs() <= slack)
-                    .unwrap_or(x)
-            };
-            (low, high) = (snap(low), snap(high));
+            (low, high) = (snap(low, range), snap(high, range));
             if period.is_none() {
                 (low, high) = (low.max(range[0]), high.min(range[1]));
             }
         }
+        // Not over a point in which it meets its axis.
+        let points = on.surface.between_points(k, 0.5 * (low + high));
+        (low, high) = (
+            snap(low, points).max(points[0]),
+            snap(high, points).min(points[1]),
+        );
         let near = 0.1 * (high - low);
         for end in [&mut low, &mut high] {
             let slack = KNOT_MM / FOLLOWS_MM * slack;
-            let knots = joints(surface, k, [*end - near, *end + near]);
+            let knots = joints(on.surface, k, [*end - near, *end + near]);
             let nearest = knots
                 .iter()
                 .map(|(knot, _)| *knot)

@@ -87,7 +87,7 @@ impl<'s> Remap<'s> {
     }
 
     /// A polygon; its edges stay within the tolerance, mm.
-    pub(super) fn polygon(&self, surface: &Surface, polygon: &Polygon, tolerance_mm: f64) -> Polygon {
+    pub(super) fn polygon(&self, on: &Periodic<'_>, polygon: &Polygon, tolerance_mm: f64) -> Polygon {
         if let [Map::Same, Map::Same] = self.0 {
             return polygon.clone();
         }
@@ -95,14 +95,14 @@ impl<'s> Remap<'s> {
         for (index, place) in polygon.iter().enumerate() {
             let next = polygon[(index + 1) % polygon.len()];
             out.push(self.at(*place));
-            self.edge(surface, [*place, next], tolerance_mm, HALVINGS, &mut out);
+            self.edge(on, [*place, next], tolerance_mm, HALVINGS, &mut out);
         }
         out
     }
 
     fn edge(
         &self,
-        surface: &Surface,
+        on: &Periodic<'_>,
         [a, b]: [[f64; 2]; 2],
         tolerance_mm: f64,
         left: u32,
@@ -110,7 +110,7 @@ impl<'s> Remap<'s> {
     ) {
         let middle: [f64; 2] = std::array::from_fn(|k| 0.5 * (a[k] + b[k]));
         let (ends, exact) = ([self.at(a), self.at(b)], self.at(middle));
-        let at = Periodic::new(surface).at(middle[0], middle[1]);
+        let at = on.at(middle[0], middle[1]);
         let mut off_mm = 0.0_f64;
         for (k, speed) in [at.u.length(), at.v.length()].into_iter().enumerate() {
             off_mm = off_mm.max((exact[k] - 0.5 * (ends[0][k] + ends[1][k])).abs() * speed);
@@ -119,9 +119,9 @@ impl<'s> Remap<'s> {
         let wide = (0..2).any(|k| (a[k] - b[k]).abs() > 0.5 && matches!(self.0[k], Map::Angle(_)));
         let bent = a[0] != b[0] && a[1] != b[1];
         if left > 0 && bent && (off_mm > tolerance_mm || wide) {
-            self.edge(surface, [a, middle], tolerance_mm, left - 1, out);
+            self.edge(on, [a, middle], tolerance_mm, left - 1, out);
             out.push(exact);
-            self.edge(surface, [middle, b], tolerance_mm, left - 1, out);
+            self.edge(on, [middle, b], tolerance_mm, left - 1, out);
         }
     }
 }

@@ -13,6 +13,8 @@ pub const DEGREE_MAX: usize = 25;
 
 /// Largest number of nonzero basis functions at a parameter.
 const ORDER_MAX: usize = DEGREE_MAX + 1;
+/// That of most files: clearing and copying room for more takes longer than the functions.
+const ORDER_USUAL: usize = 6;
 
 /// Parameters this close to a knot, as a share of the domain, are set to it: rounding of files and of point inversion.
 const KNOT_SNAP: f64 = 1e-12;
@@ -35,8 +37,8 @@ pub struct Axis {
     pub knots: Vec<f64>,
 }
 
-/// Values, first and second derivatives of the nonzero basis functions at a parameter.
-type Basis = [[f64; ORDER_MAX]; 3];
+/// Values, first and second derivatives of the nonzero basis functions at a parameter, with room for N of them.
+type Basis<const N: usize> = [[f64; N]; 3];
 
 impl Axis {
     /// Number of poles for these knots.
@@ -78,9 +80,10 @@ impl Axis {
     }
 
     /// Index of the first pole with influence at `t`, and the basis functions with two derivatives (P&T A2.2, eqn 2.9).
-    pub(super) fn basis(&self, t: f64, side: Side) -> (usize, Basis) {
+    /// N is above the degree.
+    pub(super) fn basis<const N: usize>(&self, t: f64, side: Side) -> (usize, Basis<N>) {
         let (p, span) = (self.degree, self.span(t, side));
-        let (mut one, mut two) = ([[0.0; ORDER_MAX]; 3], [[0.0; ORDER_MAX]; 3]);
+        let (mut one, mut two) = ([[0.0; N]; 3], [[0.0; N]; 3]);
         let (mut lower, mut next) = (&mut one, &mut two);
         lower[0][0] = 1.0;
         for d in 1..=p {
@@ -193,7 +196,15 @@ impl SplineCurve {
     /// Point, first and second derivative, mm.
     #[must_use]
     pub fn at(&self, t: f64) -> [DVec3; 3] {
-        let (first, basis) = self.axis.basis(t, Side::Above);
+        if self.axis.degree < ORDER_USUAL {
+            self.at_of_order::<ORDER_USUAL>(t)
+        } else {
+            self.at_of_order::<ORDER_MAX>(t)
+        }
+    }
+
+    fn at_of_order<const N: usize>(&self, t: f64) -> [DVec3; 3] {
+        let (first, basis) = self.axis.basis::<N>(t, Side::Above);
         let mut sums = [[0.0; 4]; 3];
         for (r, pole) in self.poles[first..=first + self.axis.degree].iter().enumerate() {
             for (sum, functions) in sums.iter_mut().zip(&basis) {
@@ -319,9 +330,17 @@ impl SplineSurface {
 
     /// S and its derivatives; at a knot, those of the piece on the named side.
     #[must_use]
-    pub fn at_side(&self, [u, v]: [f64; 2], [side_u, side_v]: [Side; 2]) -> Derivatives {
-        let (first_u, basis_u) = self.axes[0].basis(u, side_u);
-        let (first_v, basis_v) = self.axes[1].basis(v, side_v);
+    pub fn at_side(&self, place: [f64; 2], sides: [Side; 2]) -> Derivatives {
+        if self.axes.iter().all(|axis| axis.degree < ORDER_USUAL) {
+            self.at_of_order::<ORDER_USUAL>(place, sides)
+        } else {
+            self.at_of_order::<ORDER_MAX>(place, sides)
+        }
+    }
+
+    fn at_of_order<const N: usize>(&self, [u, v]: [f64; 2], [side_u, side_v]: [Side; 2]) -> Derivatives {
+        let (first_u, basis_u) = self.axes[0].basis::<N>(u, side_u);
+        let (first_v, basis_v) = self.axes[1].basis::<N>(v, side_v);
         // [order in u][order in v], of total order up to 2.
         let mut sums = [[[0.0; 4]; 3]; 3];
         for (r, row) in self.poles[first_u..=first_u + self.axes[0].degree]

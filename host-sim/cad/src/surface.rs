@@ -269,6 +269,31 @@ impl Surface {
         }
     }
 
+    /// Range of parameter k without a point of a cone or of a torus that meets its axis within it, around a place; unbounded where there is none.
+    pub(super) fn between_points(&self, k: usize, place: f64) -> [f64; 2] {
+        match self {
+            Self::Cone { radius, slope, .. } if k == 1 && *slope != 0.0 => {
+                let apex = -radius / slope;
+                if place < apex {
+                    [f64::NEG_INFINITY, apex]
+                } else {
+                    [apex, f64::INFINITY]
+                }
+            }
+            Self::Torus { major, minor, .. } if k == 1 && *minor > 0.0 && *minor >= major.abs() => {
+                // On one side of the axis between -first and first, on the other from first to a turn less.
+                let first = (-major / minor).acos();
+                let turns = ((place + first) / TAU).floor() * TAU;
+                if place - turns < first {
+                    [turns - first, turns + first]
+                } else {
+                    [turns + first, turns + TAU - first]
+                }
+            }
+            _ => [f64::NEG_INFINITY, f64::INFINITY],
+        }
+    }
+
     /// Parameters of direction k (0: u, 1: v) inside a range at which the surface or one of its first two derivatives may jump.
     #[must_use]
     pub fn joints(&self, k: usize, range: [f64; 2]) -> Vec<f64> {
@@ -281,7 +306,15 @@ impl Surface {
     /// S and its derivatives, with parameters that may lie one period beyond the seam of a closed B-spline.
     #[must_use]
     pub fn at_periodic(&self, u: f64, v: f64) -> Derivatives {
-        Periodic::new(self).at(u, v)
+        let inside =
+            |t: f64, range: Option<[f64; 2]>| range.is_none_or(|[start, end]| t >= start && t <= end);
+        let [range_u, range_v] = self.domain();
+        // Whether a B-spline is closed matters beyond its domain alone.
+        if inside(u, range_u) && inside(v, range_v) {
+            self.at(u, v)
+        } else {
+            Periodic::new(self).at(u, v)
+        }
     }
 
     /// S and its derivatives.
@@ -398,9 +431,14 @@ impl Surface {
     }
 }
 
-/// A surface whose parameters may lie beyond the seam of a closed B-spline, one period further: its polynomials end there.
+/// A surface at many points, with what is the same at all of them: whether a B-spline is closed takes dozens of points. Parameters may lie beyond the seam
+/// of a closed B-spline, one period further: its polynomials end there.
 pub struct Periodic<'s> {
-    surface: &'s Surface,
+    pub(super) surface: &'s Surface,
+    /// Ranges of u and v; `None` if unbounded.
+    pub(super) domain: [Option<[f64; 2]>; 2],
+    /// Periods of u and of v of a closed surface.
+    pub(super) periods: [Option<f64>; 2],
     /// Domain of the parameters that are wrapped.
     wrapped: [Option<[f64; 2]>; 2],
 }
@@ -409,18 +447,21 @@ impl<'s> Periodic<'s> {
     /// Of a surface.
     #[must_use]
     pub fn new(surface: &'s Surface) -> Self {
+        let (domain, periods) = (surface.domain(), surface.periods());
         let mut base = surface;
         while let Surface::Offset { base: inner, .. } = base {
             base = inner;
         }
         let wrapped = match base {
-            Surface::Spline(spline) => {
-                let (domain, periods) = (spline.domain(), closed(spline));
-                std::array::from_fn(|k| periods[k].map(|_| domain[k]))
-            }
+            Surface::Spline(_) => std::array::from_fn(|k| periods[k].and(domain[k])),
             _ => [None, None],
         };
-        Self { surface, wrapped }
+        Self {
+            surface,
+            domain,
+            periods,
+            wrapped,
+        }
     }
 
     /// S and its derivatives.

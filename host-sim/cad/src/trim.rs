@@ -77,7 +77,8 @@ pub fn trim(
         Boundary::Loops(_) if outline.trimmed.is_none() => return Ok(vec![whole()]),
         Boundary::Loops(loops) => loops,
     };
-    let paths = paths(surface, loops);
+    let on = &Periodic::new(surface);
+    let paths = paths(on, loops);
     let off_mm = paths.iter().map(|path| path.off_mm).fold(0.0, f64::max);
     if off_mm > OFF_MM {
         return Err(format!("its boundary lies {off_mm:.4} mm off its surface").into());
@@ -86,37 +87,37 @@ pub fn trim(
     let lines: Vec<Polygon> = loops
         .iter()
         .zip(&paths)
-        .map(|(edges, path)| line(surface, edges, path, chord_mm, false))
+        .map(|(edges, path)| line(on, edges, path, chord_mm, false))
         .collect();
     if lines.iter().flatten().flatten().any(|x| !x.is_finite()) {
         return Err("its boundary has no parameters".to_owned().into());
     }
-    closed(surface, &lines, &paths)?;
+    closed(on, &lines, &paths)?;
     let lines: Vec<Polygon> = lines.into_iter().map(unspiked).collect();
     let polygons = match winding(&paths) {
         Winding::None => {
             let mut polygons: Vec<Polygon> = lines.into_iter().filter(|line| line.len() > 2).collect();
-            if polygons.is_empty() || seam_only(&paths) || complementary(surface, &paths, face.sense) {
+            if polygons.is_empty() || seam_only(&paths) || complementary(on, &paths, face.sense) {
                 polygons.push(corners(outline.rectangle));
             }
             polygons
         }
-        Winding::Along(k) => belts(surface, &lines, &paths, k, face.sense, outline.rectangle)?,
+        Winding::Along(k) => belts(on, &lines, &paths, k, face.sense, outline.rectangle)?,
         Winding::Both => {
             return Err("its boundary winds around the surface both ways"
                 .to_owned()
                 .into());
         }
     };
-    let inside = within(surface, polygons, outline.rectangle);
+    let inside = within(on, polygons, outline.rectangle);
     if inside.iter().flatten().flatten().any(|x| !x.is_finite()) {
         return Err("its boundary has no parameters".to_owned().into());
     }
     let rough: Vec<Polygon> = inside
         .iter()
-        .map(|polygon| simplified(polygon, metric(surface, polygon), CHORD_SHARE * tolerance_mm))
+        .map(|polygon| simplified(polygon, metric(on, polygon), CHORD_SHARE * tolerance_mm))
         .collect();
-    if let Some(found) = crossing(surface, &rough, CROSSING_MM) {
+    if let Some(found) = crossing(on, &rough, CROSSING_MM) {
         let [x, y, z] = found.place_mm.to_array();
         return Err(format!(
             "its boundary crosses itself by {:.3} mm at [{x:.3}, {y:.3}, {z:.3}]",
@@ -126,10 +127,10 @@ pub fn trim(
     }
     let polygons = inside.iter().map(|polygon| {
         let fine = match &remap {
-            Some(remap) => remap.polygon(surface, polygon, 0.1 * tolerance_mm),
+            Some(remap) => remap.polygon(on, polygon, 0.1 * tolerance_mm),
             None => polygon.clone(),
         };
-        let metric = metric(surface, polygon);
+        let metric = metric(on, polygon);
         simplified(&fine, metric, 0.8 * tolerance_mm)
     });
     let polygons: Vec<Polygon> = polygons.filter(|polygon| polygon.len() > 2).collect();
@@ -150,12 +151,12 @@ pub fn polylines(face: &Face, tolerance_mm: f64) -> Vec<Vec<DVec3>> {
         Boundary::Unknown(_) => return Vec::new(),
     };
     let on = Periodic::new(surface);
-    let paths = paths(surface, loops);
+    let paths = paths(&on, loops);
     loops
         .iter()
         .zip(&paths)
         .map(|(edges, path)| {
-            let line = line(surface, edges, path, tolerance_mm, true);
+            let line = line(&on, edges, path, tolerance_mm, true);
             let mut points: Vec<DVec3> = line.iter().map(|place| on.at(place[0], place[1]).point).collect();
             points.dedup();
             points
@@ -232,12 +233,11 @@ fn seam_only(paths: &[Path]) -> bool {
 }
 
 /// A loop as a line of parameters, its chords within the tolerance of the surface's curve, mm: the chords of (u, v), or those in space if `in_space`.
-fn line(surface: &Surface, edges: &[Edge], path: &Path, chord_mm: f64, in_space: bool) -> Polygon {
+fn line(on: &Periodic<'_>, edges: &[Edge], path: &Path, chord_mm: f64, in_space: bool) -> Polygon {
     let mut out: Polygon = Vec::new();
     for (points, places) in edges.iter().zip(&path.edges) {
         let halving = Halving {
-            surface,
-            on: Periodic::new(surface),
+            on,
             points,
             chord_mm,
             in_space,
@@ -254,8 +254,7 @@ fn line(surface: &Surface, edges: &[Edge], path: &Path, chord_mm: f64, in_space:
 
 /// The intervals of an edge, halved until they follow the surface.
 struct Halving<'a> {
-    surface: &'a Surface,
-    on: Periodic<'a>,
+    on: &'a Periodic<'a>,
     points: &'a [DVec3],
     chord_mm: f64,
     in_space: bool,
@@ -286,9 +285,7 @@ impl Halving<'_> {
     }
 
     fn place(&self, index: usize, share: f64, near: [f64; 2]) -> [f64; 2] {
-        self.surface
-            .invert(between(self.points, index, share), Some(near))
-            .0
+        self.on.invert(between(self.points, index, share), Some(near)).0
     }
 
     /// Distance of the surface's point at a place from its point on the chord, across the chord, mm.
@@ -306,9 +303,8 @@ impl Halving<'_> {
 }
 
 /// Checks that the loops are closed on the surface.
-fn closed(surface: &Surface, lines: &[Polygon], paths: &[Path]) -> Result<(), TrimError> {
-    let on = Periodic::new(surface);
-    let periods = surface.periods();
+fn closed(on: &Periodic<'_>, lines: &[Polygon], paths: &[Path]) -> Result<(), TrimError> {
+    let periods = on.periods;
     for (line, path) in lines.iter().zip(paths) {
         let (Some(first), Some(last)) = (line.first(), line.last()) else {
             continue;
@@ -347,14 +343,14 @@ fn unspiked(line: Polygon) -> Polygon {
 
 /// Polygons of a face whose loops wind around the surface in parameter k.
 fn belts(
-    surface: &Surface,
+    on: &Periodic<'_>,
     lines: &[Polygon],
     paths: &[Path],
     k: usize,
     sense: f64,
     rectangle: [[f64; 2]; 2],
 ) -> Result<Vec<Polygon>, TrimError> {
-    let Some(period) = surface.periods()[k] else {
+    let Some(period) = on.periods[k] else {
         return Err("its boundary winds around a surface that is not closed"
             .to_owned()
             .into());
@@ -379,7 +375,13 @@ fn belts(
     let place = |t: f64, across: f64| if k == 0 { [t, across] } else { [across, t] };
     match around.as_slice() {
         [only] => {
-            let across = if side > 0.0 { high } else { low };
+            // The rectangle begins within the domain, the line where its points were found.
+            let middle = |[low, high]: [f64; 2]| 0.5 * (low + high);
+            let turns = on.periods[1 - k].map_or(0.0, |period| {
+                let apart = middle(extent(only, 1 - k)) - middle([low, high]);
+                period * (apart / period).round()
+            });
+            let across = turns + if side > 0.0 { high } else { low };
             let mut polygon = only.clone();
             polygon.extend([place(end, across), place(start, across)]);
             polygons.push(polygon);
@@ -436,9 +438,9 @@ fn unrolled(line: &Polygon, winding: f64, k: usize, period: f64, [start, end]: [
 }
 
 /// Polygons moved by whole periods into the rectangle, and clipped to it.
-fn within(surface: &Surface, polygons: Vec<Polygon>, rectangle: [[f64; 2]; 2]) -> Vec<Polygon> {
+fn within(on: &Periodic<'_>, polygons: Vec<Polygon>, rectangle: [[f64; 2]; 2]) -> Vec<Polygon> {
     let mut all = polygons;
-    for (k, period) in surface.periods().into_iter().enumerate() {
+    for (k, period) in on.periods.into_iter().enumerate() {
         let Some(period) = period else { continue };
         let [low, high] = rectangle[k];
         let slack = 1e-9 * period;
@@ -506,8 +508,7 @@ pub(super) fn clipped(polygon: &Polygon, k: usize, end: f64, sign: f64) -> Polyg
 }
 
 /// Largest lengths of the derivatives by u and v along a polygon, mm per unit.
-fn metric(surface: &Surface, polygon: &Polygon) -> [f64; 2] {
-    let on = Periodic::new(surface);
+fn metric(on: &Periodic<'_>, polygon: &Polygon) -> [f64; 2] {
     let next = polygon.iter().cycle().skip(1);
     // Middles of edges, too: all corners may be poles.
     let places = polygon

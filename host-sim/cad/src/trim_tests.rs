@@ -3,6 +3,7 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use super::*;
+use ::job::FaceParameters;
 use glam::{DVec3, dvec3};
 
 /// Precision of the polygons, mm.
@@ -248,6 +249,79 @@ fn poles_are_enclosed() {
     assert!(
         (missing / (PI * 4.0 * 0.3_f64.cos()) - 1.0).abs() < 0.02,
         "{missing}"
+    );
+}
+
+/// A torus with a tube that is wider than its ring meets its axis at two points, which part it into an outer and an inner sheet: a cap of either ends in one
+/// of them.
+#[test]
+fn points_of_a_spindle_torus_are_enclosed() {
+    let (major, minor) = (8.25_f64, 20.0_f64);
+    let surface = Surface::Torus {
+        center: dvec3(1.0, -2.0, 3.0),
+        x: DVec3::X,
+        y: DVec3::Y,
+        z: DVec3::Z,
+        major,
+        minor,
+    };
+    let first = (-major / minor).acos();
+    // Area of a turn between two circles around the axis.
+    let between = |[low, high]: [f64; 2]| {
+        (TAU * minor * (major * (high - low) + minor * (high.sin() - low.sin()))).abs()
+    };
+    // Both ends of the inner sheet and one of the outer: a circle, and the point that it ends in. The last one is found below the seam.
+    for (circle, point) in [
+        (first + 0.4, first),
+        (first - 0.4, first),
+        (TAU - first - 0.4, TAU - first),
+    ] {
+        let turn = if point > circle { 1.0 } else { -1.0 };
+        let rim = |wave: f64| {
+            edge(&surface, |share| {
+                let u = turn * TAU * share;
+                [u, circle + wave * (3.0 * u).sin()]
+            })
+        };
+        let range = [circle.min(point), circle.max(point)];
+        let whole = outline(&face(surface.clone(), vec![vec![rim(0.0)]], 1.0)).unwrap();
+        assert_eq!(whole.trimmed, None);
+        let found = whole.rectangle[1];
+        assert!(
+            (0..2).all(|k| (found[k] - range[k]).abs() < 1e-9),
+            "{found:?} for {range:?}"
+        );
+        // Its rim waved, and a window in it.
+        let middle = [2.0, 0.5 * (circle + point)];
+        let window = ellipse(&surface, middle, [0.3, 0.06], -1.0);
+        let cap = face(surface.clone(), vec![vec![rim(0.1)], window], 1.0);
+        let out = major + minor * middle[1].cos();
+        let wave = {
+            let steps = 20_000;
+            let at = |k: i32| {
+                let u = TAU * (f64::from(k) + 0.5) / f64::from(steps);
+                between([circle + 0.1 * (3.0 * u).sin(), point]) / f64::from(steps)
+            };
+            (0..steps).map(at).sum::<f64>()
+        };
+        is_area(&cap, wave - PI * (0.3 * out.abs()) * (0.06 * minor));
+        // More of the surface around it ends at the point, too.
+        let options = Options {
+            around_mm: 3.0,
+            parameters: FaceParameters::Surface,
+            ..Options::default()
+        };
+        let made = machinable("", &cap, &options).unwrap();
+        let domain = made.nurbs.domain()[1];
+        let end = if point > circle { domain[1] } else { domain[0] };
+        assert!((end - point).abs() < 1e-9, "{domain:?} to {point}");
+    }
+    // The inner sheet without a window.
+    let window = ellipse(&surface, [2.0, PI], [0.3, 0.1], -1.0);
+    let missing = PI * (0.3 * (minor - major)) * (0.1 * minor);
+    is_area(
+        &face(surface.clone(), vec![window], 1.0),
+        between([first, TAU - first]) - missing,
     );
 }
 

@@ -117,10 +117,19 @@ fn blend(a: Pole, b: Pole, t: f64) -> Pole {
     std::array::from_fn(|k| (1.0 - t) * a[k] + t * b[k])
 }
 
-/// The polar form (blossom) of a B-spline's piece on the knot span that contains `range`, at these arguments. With k arguments at
-/// the range's end and the others at its start, the value is the k-th Bezier pole.
-fn blossom(knots: &[f64], poles: &[Pole], degree: usize, span: usize, arguments: &[f64]) -> Pole {
-    let mut d: Vec<Pole> = poles[span - degree..=span].to_vec();
+/// Poles that have influence on one piece, of degree 3 at most: as many as the degree plus 1, then zeros.
+type Acting = [Pole; 4];
+
+/// The knot span that contains a range.
+fn span(knots: &[f64], [start, end]: [f64; 2]) -> usize {
+    let middle = 0.5 * (start + end);
+    knots.partition_point(|knot| *knot <= middle) - 1
+}
+
+/// The polar form (blossom) of a B-spline's piece on a knot span, at these arguments. With k arguments at the end of a range within the span and the
+/// others at its start, the value is the k-th Bezier pole of that range.
+fn blossom(knots: &[f64], poles: &Acting, degree: usize, span: usize, arguments: &[f64]) -> Pole {
+    let mut d = *poles;
     for (r, &t) in (1..=degree).zip(arguments) {
         for j in (r..=degree).rev() {
             let (low, high) = (knots[span - degree + j], knots[span + 1 + j - r]);
@@ -130,15 +139,10 @@ fn blossom(knots: &[f64], poles: &[Pole], degree: usize, span: usize, arguments:
     d[degree]
 }
 
-/// Bezier poles of degree 3 over `range` from B-spline poles of degree 1 to 3: exact, by degree elevation.
-fn bezier(knots: &[f64], poles: &[Pole], degree: usize, range: [f64; 2]) -> [Pole; 4] {
-    let [start, end] = range;
-    let middle = 0.5 * (start + end);
-    let span = knots.partition_point(|knot| *knot <= middle) - 1;
+/// Bezier poles of degree 3 over a range within a knot span from B-spline poles of degree 1 to 3: exact, by degree elevation.
+fn bezier(knots: &[f64], poles: &Acting, degree: usize, span: usize, [start, end]: [f64; 2]) -> [Pole; 4] {
     let pole = |k: usize| {
-        let arguments: Vec<f64> = (0..degree)
-            .map(|i| if i < degree - k { start } else { end })
-            .collect();
+        let arguments: [f64; 3] = std::array::from_fn(|i| if i + k < degree { start } else { end });
         blossom(knots, poles, degree, span, &arguments)
     };
     match degree {
@@ -167,18 +171,19 @@ fn centred_powers([b0, b1, b2, b3]: [f64; 4]) -> [f64; 4] {
 fn spline_piece(nurbs: &NurbsSpec, u: [f64; 2], v: [f64; 2]) -> Piece {
     let [p, q] = nurbs.degree;
     let homogeneous = |&[x, y, z, w]: &[f64; 4]| [w * x, w * y, w * z, w];
-    // Along v for every row of poles, then along u for each of the four columns.
-    let rows: Vec<[Pole; 4]> = nurbs
-        .poles_mm
-        .iter()
-        .map(|row| {
-            let row: Vec<Pole> = row.iter().map(homogeneous).collect();
-            bezier(&nurbs.knots_v, &row, q, v)
-        })
-        .collect();
+    let (span_u, span_v) = (span(&nurbs.knots_u, u), span(&nurbs.knots_v, v));
+    // Of the poles that have influence: along v for every row, then along u for each of the four columns.
+    let mut rows = [[[0.0; 4]; 4]; 4];
+    for (row, poles) in rows.iter_mut().zip(&nurbs.poles_mm[span_u - p..=span_u]) {
+        let mut acting = [[0.0; 4]; 4];
+        for (to, pole) in acting.iter_mut().zip(&poles[span_v - q..=span_v]) {
+            *to = homogeneous(pole);
+        }
+        *row = bezier(&nurbs.knots_v, &acting, q, span_v, v);
+    }
     let columns: [[Pole; 4]; 4] = std::array::from_fn(|j| {
-        let column: Vec<Pole> = rows.iter().map(|row| row[j]).collect();
-        bezier(&nurbs.knots_u, &column, p, u)
+        let acting = rows.each_ref().map(|row| row[j]);
+        bezier(&nurbs.knots_u, &acting, p, span_u, u)
     });
     std::array::from_fn(|k| {
         // [i][j] Bernstein, i along u; then powers in v, then in u.

@@ -12,7 +12,7 @@ use crate::interpolation::between as interpolated;
 use crate::outline::{Path, Winding, constant, paths, winding};
 use crate::remap::Remap;
 use crate::spline::{Axis, Pole, SplineCurve, SplineSurface};
-use crate::surface::Surface;
+use crate::surface::{Periodic, Surface};
 use crate::{Edge, Outline};
 
 /// Most spans of an edge for each span of the surface.
@@ -32,10 +32,11 @@ pub(super) fn between(surface: &Surface, loops: &[Vec<Edge>], now: &Outline) -> 
     ) {
         return None;
     }
-    let paths = paths(surface, loops);
+    let on = Periodic::new(surface);
+    let paths = paths(&on, loops);
     let (chains, range) = match winding(&paths) {
-        Winding::None => beside(surface, loops, &paths)?,
-        Winding::Along(0) => (around(surface, loops, &paths)?, now.rectangle[0]),
+        Winding::None => beside(&on, loops, &paths)?,
+        Winding::Along(0) => (around(&on, loops, &paths)?, now.rectangle[0]),
         _ => return None,
     };
     let lines = Lines::new(surface, range)?;
@@ -70,25 +71,21 @@ pub(super) fn between(surface: &Surface, loops: &[Vec<Edge>], now: &Outline) -> 
 
 /// An edge, or several in a row, that meets each line once.
 struct Chain<'a> {
-    surface: &'a Surface,
+    on: &'a Periodic<'a>,
     pieces: Vec<(&'a Edge, &'a [[f64; 2]])>,
     period: Option<f64>,
 }
 
 /// The two chains of a face between two lines, and where those are.
 fn beside<'a>(
-    surface: &'a Surface,
+    on: &'a Periodic<'a>,
     loops: &'a [Vec<Edge>],
     paths: &'a [Path],
 ) -> Option<([Chain<'a>; 2], [f64; 2])> {
     let ([edges], [path]) = (loops, paths) else {
         return None;
     };
-    let is_line: Vec<bool> = path
-        .edges
-        .iter()
-        .map(|places| constant(surface, places, 0))
-        .collect();
+    let is_line: Vec<bool> = path.edges.iter().map(|places| constant(on, places, 0)).collect();
     // From the first edge after a line on.
     let count = edges.len();
     let start = (0..count).find(|k| !is_line[*k] && is_line[(k + count - 1) % count])?;
@@ -98,7 +95,7 @@ fn beside<'a>(
         if !is_line[k] {
             if was_line {
                 chains.push(Chain {
-                    surface,
+                    on,
                     pieces: Vec::new(),
                     period: None,
                 });
@@ -114,21 +111,21 @@ fn beside<'a>(
     let range = chains.each_ref().map(Chain::range);
     let low = 0.5 * (range[0][0] + range[1][0]);
     let high = 0.5 * (range[0][1] + range[1][1]);
-    let speed = surface.at(0.5 * (low + high), path.edges[start][0][1]).u.length();
+    let speed = on.at(0.5 * (low + high), path.edges[start][0][1]).u.length();
     let is_met = |k: usize| (range[0][k] - range[1][k]).abs() * speed <= FOLLOWS_MM;
     let fits = is_met(0) && is_met(1) && chains.iter().all(Chain::is_once);
     fits.then_some((chains, [low, high]))
 }
 
 /// The two chains of a face all around.
-fn around<'a>(surface: &'a Surface, loops: &'a [Vec<Edge>], paths: &'a [Path]) -> Option<[Chain<'a>; 2]> {
+fn around<'a>(on: &'a Periodic<'a>, loops: &'a [Vec<Edge>], paths: &'a [Path]) -> Option<[Chain<'a>; 2]> {
     if paths.iter().any(|path| path.winding[0].abs() != 1.0) {
         return None;
     }
     let chains = loops.iter().zip(paths).map(|(edges, path)| Chain {
-        surface,
+        on,
         pieces: edges.iter().zip(path.edges.iter().map(Vec::as_slice)).collect(),
-        period: surface.periods()[0],
+        period: on.periods[0],
     });
     let chains: [Chain<'a>; 2] = chains.collect::<Vec<_>>().try_into().ok()?;
     chains.iter().all(Chain::is_once).then_some(chains)
@@ -180,11 +177,7 @@ impl Chain<'_> {
         }
         let (points, places, index, u) = best?;
         let near = places[index];
-        let place = |share: f64| {
-            self.surface
-                .invert(interpolated(points, index, share), Some(near))
-                .0
-        };
+        let place = |share: f64| self.on.invert(interpolated(points, index, share), Some(near)).0;
         let is_rising = places[index + 1][0] > places[index][0];
         let (mut low, mut high) = (-0.1, 1.1);
         for _ in 0..BISECTIONS {

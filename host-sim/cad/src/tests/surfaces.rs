@@ -119,6 +119,45 @@ fn concave_radii_are_measured() {
     }
 }
 
+/// Places of both sheets of a torus whose tube is wider than its ring, between and beside the two points in which they meet; a horn torus, and a ring.
+#[test]
+fn places_on_a_torus_are_found() {
+    for (major, minor) in [(8.25, 54.873_718_663_856), (5.0, 6.0), (6.0, 6.0), (20.0, 6.0)] {
+        let torus = Surface::Torus {
+            center: dvec3(100.0, -20.0, 7.0),
+            x: dvec3(0.6, 0.8, 0.0),
+            y: DVec3::Z,
+            z: dvec3(0.8, -0.6, 0.0),
+            major,
+            minor,
+        };
+        for i in 0..40 {
+            for j in 0..41 {
+                let (u, v) = (0.157 * f64::from(i), 0.153 * f64::from(j));
+                let point = torus.at(u, v).point;
+                for near in [None, Some([u + 0.1, v - 0.1])] {
+                    let (place, off_mm) = torus.invert(point, near);
+                    assert!(
+                        off_mm < 1e-9,
+                        "{off_mm} mm off at {u}, {v} of radii {major}, {minor}"
+                    );
+                    for (found, wanted) in place.into_iter().zip([u, v]) {
+                        let turns = if near.is_some() {
+                            0.0
+                        } else {
+                            ((found - wanted) / TAU).round()
+                        };
+                        assert!(
+                            (found - wanted - turns * TAU).abs() < 1e-9,
+                            "{place:?} for {u}, {v} of radii {major}, {minor}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+}
+
 /// A place on the flank of a thread is found without a guess, though other turns are next to it: 25 turns, 200 spans of a quadratic along the helix.
 #[test]
 fn places_on_a_thread_are_found() {
