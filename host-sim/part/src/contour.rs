@@ -36,6 +36,8 @@ pub struct Precision {
 pub struct Set<'a> {
     /// The rectangle.
     pub rectangle: [[f64; 2]; 2],
+    /// Which of its sides are cuts: contours are pulled in from them; on the others they stay.
+    pub cuts: [[bool; 2]; 2],
     /// Lengths of the derivatives by u and v, mm: at most.
     pub metric: [f64; 2],
     /// Where the places are in space.
@@ -353,7 +355,7 @@ impl Set<'_> {
         to(long)
     }
 
-    /// Each vertex moved in, to the left of its edges; those on a side of the rectangle stay on it.
+    /// Each vertex moved in, to the left of its edges; those on a side of the rectangle stay on it, unless it is a cut.
     fn pulled_in(&self, polygon: &[Place], by: f64) -> Vec<Place> {
         let count = polygon.len();
         (0..count)
@@ -373,7 +375,8 @@ impl Set<'_> {
                 let (m, n) = (unit(before, here), unit(here, after));
                 let sum = [m[0] + n[0], m[1] + n[1]];
                 let share = (by / (0.5 * (sum[0] * sum[0] + sum[1] * sum[1])).max(0.25)).min(2.0 * by);
-                let on_side = [0, 1].map(|k| self.rectangle[k].contains(&here[k]));
+                let on_side =
+                    [0, 1].map(|k| (0..2).any(|end| self.rectangle[k][end] == here[k] && !self.cuts[k][end]));
                 let inwards = [0, 1].map(|k| if on_side[k] { 0.0 } else { share * sum[k] });
                 let by = [0, 1].map(|k| inwards[k] / metric[k]);
                 self.moved(here, by, inwards[0].hypot(inwards[1]))

@@ -16,7 +16,7 @@ use crate::region::{Made, Request};
 use crate::tool::{Reason, Tool};
 
 /// The method by which regions are made: others in a cache are not used.
-const METHOD: u32 = 11;
+const METHOD: u32 = 12;
 /// Folder beside the job in which regions are kept.
 const CACHE: &str = ".isofeed";
 /// How deep the tool may enter the part, mm, where no part says it: only the grid of a face alone depends on it.
@@ -280,13 +280,13 @@ fn nothing(source: &CadSource, found: &Found, radius_mm: f64) -> FaceError {
         .collect();
     FaceError {
         what: format!(
-            "a ball of {radius_mm} mm reaches nothing of face {} ({:.3} mm2): {}",
+            "a ball of radius {radius_mm} mm reaches nothing of face {} ({:.3} mm2): {}",
             source.face,
             found.area_mm2,
             why.join(", ")
         ),
         remedy: match found.radius_mm {
-            Some(radius_mm) => format!("take a ball of at most {radius_mm:.3} mm, or turn the part with [placement]"),
+            Some(radius_mm) => format!("take a ball of radius {radius_mm:.3} mm at most, or turn the part with [placement]"),
             None => "turn the part with [placement], or choose another face; `cargo sim import FILE --part` tells what can be reached".to_owned(),
         },
         of_face: true,

@@ -5,6 +5,7 @@
 //!                                 │ clear.rs     steep, fit, ball, shank, holder: the first rule that a place of a face breaks
 //!                                 ▼
 //! trimmed region of a face ──region.rs──► grown by half a step-over where all rules hold ──contour.rs──► polygons of (u, v)
+//!                                 ▲ crease.rs    cut at knots at which the tangent plane jumps
 //!
 //! ends of passes ──links.rs──► how each link goes: straight, or at the height that the tool needs over the part
 //! emitted centres ──proof.rs──► the deepest place of the tool in the part, what is left on the reachable part of the face
@@ -16,6 +17,7 @@ mod body;
 mod cell;
 mod clear;
 mod contour;
+mod crease;
 mod faces;
 mod heights;
 mod inside;

@@ -1,4 +1,4 @@
-//! The region of a face that a tool finishes: where the face is, and half a step-over around it, as far as nothing is in the way.
+//! The region of a face that a tool finishes: where the face is, and half a step-over around it, as far as nothing is in the way. It is cut at creases.
 
 use cad::{Face, Placement, polylines};
 use glam::DVec3;
@@ -8,6 +8,7 @@ use oracle::Surface;
 use crate::body::Part;
 use crate::clear::Clearance;
 use crate::contour::{Precision, Set};
+use crate::crease::strips;
 use crate::inside::Inside;
 use crate::tool::{Reason, Tool};
 use crate::tree::{Block, Tree};
@@ -242,20 +243,33 @@ impl Request<'_> {
             trimmed.contains(place)
                 || grow_mm > 0.0 && border.is_near(self.surface.at(place[0], place[1]).point, grow_mm)
         };
-        let set = Set {
-            rectangle,
-            metric,
-            surface: self.surface,
-            finer: stretch,
-            holds: &|place| is_wanted(place) && clearance.check(place).is_ok(),
-            is_sure: &|place| clearance.surely(place),
-        };
-        made.loops = set.contours(&Precision {
-            grid_mm: clearance.spacing_mm(),
-            chord_mm: CHORD_MM,
-            inset_mm: INSET_MM,
-            simplify_mm: SIMPLIFY_MM,
-        });
+        let [of_u, of_v] =
+            [Along::U, Along::V].map(|along| strips(self.surface, along, rectangle, self.tool.radius));
+        let is_cut = of_u.len() * of_v.len() > 1;
+        for ((u, u_cuts), (v, v_cuts)) in of_u.iter().flat_map(|u| of_v.iter().map(move |v| (*u, *v))) {
+            let rectangle = [u, v];
+            let (metric, finer) = if is_cut {
+                let looks = self.looks(rectangle);
+                (looks.metric, looks.stretch)
+            } else {
+                (metric, stretch)
+            };
+            let set = Set {
+                rectangle,
+                cuts: [u_cuts, v_cuts],
+                metric,
+                surface: self.surface,
+                finer,
+                holds: &|place| is_wanted(place) && clearance.check(place).is_ok(),
+                is_sure: &|place| clearance.surely(place),
+            };
+            made.loops.extend(set.contours(&Precision {
+                grid_mm: clearance.spacing_mm(),
+                chord_mm: CHORD_MM,
+                inset_mm: INSET_MM,
+                simplify_mm: SIMPLIFY_MM,
+            }));
+        }
         let inside = Inside::new(&made.loops);
         let reached = places.iter().zip(&checked).filter(|(_, checked)| checked.is_ok());
         made.inside_mm2 = reached

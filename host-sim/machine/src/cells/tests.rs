@@ -112,3 +112,58 @@ fn a_comb_is_parted() {
         crate::prepare::prepare(&job).unwrap();
     }
 }
+
+/// A roof of two planes of 10 x 20 mm, straight along v, the ridge at u = 1.
+fn roof(along: Along, loops: Vec<Polygon>) -> Job {
+    let text = "[surface]\nkind = \"nurbs\"\ndegree = [1, 1]\nknots_u = [0, 0, 1, 2, 2]\nknots_v = [0, 0, 1, 1]\n\
+        poles_mm = [\n\
+        [[0, 0, 0], [0, 20, 0]],\n\
+        [[10, 0, 2], [10, 20, 2]],\n\
+        [[20, 0, 0], [20, 20, 0]]]\n\
+        [tool]\nkind = \"ball\"\nradius_mm = 3\n\
+        [cut]\nfeed_mm_min = 1200\nscallop_mm = 0.01\nalong = \"u\"\nside = \"up\"\n";
+    let mut job = job_file::parse("roof.toml", text).unwrap();
+    (job.along, job.pattern) = (along, Pattern::Zigzag);
+    job.machine.limits = Some(AxisLimits::DEFAULT);
+    job.region = Some(Region::new(loops));
+    job
+}
+
+/// A region that is cut at a crease runs to its end, with passes along the crease and across; one over it does not.
+#[test]
+fn parts_beside_a_crease_are_cells() {
+    let part = |from: f64, to: f64| vec![[from, 0.0], [to, 0.0], [to, 1.0], [from, 1.0]];
+    for along in [Along::U, Along::V] {
+        let mut job = roof(along, vec![part(0.0, 0.999), part(1.001, 2.0)]);
+        settle(&mut job);
+        assert_eq!(job.region.as_ref().unwrap().cells.len(), 2);
+        let prepared = crate::prepare::prepare(&job).unwrap();
+        let mut machine = crate::Machine::load(&prepared).unwrap();
+        let (mut sides, mut highest_nm) = ([0_u32; 2], 0);
+        machine
+            .run(|sample| {
+                if sample.state == interp_core::State::Running {
+                    let [x, _, z] = sample.cl_nm;
+                    sides[usize::from(x > 10_000_000)] += 1;
+                    highest_nm = highest_nm.max(z);
+                }
+                true
+            })
+            .unwrap();
+        assert!(
+            sides.iter().all(|samples| *samples > 5000),
+            "{along:?}: {sides:?}"
+        );
+        // The ball's centre over the ridge, on either plane.
+        let ridge_mm = 2.0 + 3.0 / 1.04_f64.sqrt();
+        assert!(
+            f64::from(highest_nm) * 1e-6 <= ridge_mm,
+            "{along:?}: {highest_nm}"
+        );
+    }
+    let mut job = roof(Along::U, vec![part(0.0, 2.0)]);
+    settle(&mut job);
+    let prepared = crate::prepare::prepare(&job).unwrap();
+    let fault = crate::Machine::load(&prepared).unwrap().run(|_| true);
+    assert_eq!(fault.unwrap_err().kind, interp_core::FaultKind::DegenerateSurface);
+}
