@@ -84,7 +84,10 @@ impl Asked<'_> {
         if face.solid {
             return face.sense;
         }
-        let reached = |sign| self.of(face, sign, made, |request| request.reach(LOOK_SIDE)).reachable_mm2;
+        let reached = |sign| {
+            self.of(face, sign, made, |request| request.reach(LOOK_SIDE))
+                .reachable_mm2
+        };
         if reached(-face.sense) > reached(face.sense) {
             -face.sense
         } else {
