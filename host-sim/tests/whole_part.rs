@@ -158,7 +158,9 @@ fn a_surface_alone_is_machined_from_either_side() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::copy(cad("swept.igs"), folder.path().join("swept.igs")).unwrap();
     for up in ["+z", "-z"] {
-        let command = format!("import swept.igs --part --tool 0.5 --up {up} -o side{up} --json");
+        let command = format!(
+            "import swept.igs --part --tool 2 --scallop-mm 0.2 --faces 1 --up {up} -o side{up} --json"
+        );
         let (summary, code) = json(folder.path(), &command);
         assert_eq!(code, Some(0), "{summary}");
         assert!(number(&summary["reachable_mm2"]) > 0.0, "{up}: {summary}");

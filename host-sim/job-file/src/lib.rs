@@ -25,9 +25,10 @@ mod text;
 use std::path::Path;
 
 use interp_core::command::OVERRIDE_MAX_PERCENT;
+use interp_core::job::STEP_MAX_MM;
 use job::{
     Along, AlongChoice, CHORD_DEFAULT_MM, CadSource, FEED_MAX_MM_MIN, FEED_MIN_MM_MIN, Job, JobError,
-    MachineProfile, MachineSpec, OVERRUN_MAX_MM, Pattern, STEP_MAX_MM, Side, Spacing, Start, StartChoice,
+    MachineProfile, MachineSpec, OVERRUN_MAX_MM, Pattern, Side, Spacing, Start, StartChoice,
 };
 use patches::placement::Placement;
 use section::{Reader, Section};
@@ -244,16 +245,21 @@ fn parse_on(
     Ok(job)
 }
 
-/// Within axis limits a period at the greatest override fits the core's step.
+/// Largest feed of a job with axis limits, mm/min: a period at the maximum override is the core's maximum step.
+#[must_use]
+pub fn feed_max_within_limits(period_us: f64) -> f64 {
+    f64::from(STEP_MAX_MM) * 100.0 / f64::from(OVERRIDE_MAX_PERCENT) * 60e6 / period_us
+}
+
 fn check_feed(cut: &Section<'_>, job: &Job) -> Result<(), JobError> {
-    let override_max = f64::from(OVERRIDE_MAX_PERCENT) / 100.0;
-    let most = STEP_MAX_MM / override_max * 60e6 / job.machine.period_us;
+    let period_us = job.machine.period_us;
+    let most = feed_max_within_limits(period_us);
     if !job.machine.has_limits() || job.feed_mm_min <= most {
         return Ok(());
     }
     let what = format!(
-        "`feed_mm_min` must be at most {most} on a machine with limits and a period of {} us, not {}",
-        job.machine.period_us, job.feed_mm_min
+        "`feed_mm_min` must be at most {most} on a machine with limits and a period of {period_us} us, not {}",
+        job.feed_mm_min
     );
     Err(cut.error("feed_mm_min", what, "lower the feed, or shorten period_us"))
 }

@@ -35,8 +35,6 @@ pub const OVERRUN_MAX_MM: f64 = 100.0;
 pub const FEED_MIN_MM_MIN: f64 = 0.06;
 /// Largest feed, mm/min (10 m/s): the core's limit.
 pub const FEED_MAX_MM_MIN: f64 = 600_000.0;
-/// Longest arc of a period within axis limits, at the greatest feed override, mm: the core's limit.
-pub const STEP_MAX_MM: f64 = 2.0;
 /// Default of the chord error limit, mm: the paper's.
 pub const CHORD_DEFAULT_MM: f64 = 0.005;
 

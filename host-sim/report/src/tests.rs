@@ -344,6 +344,25 @@ fn gaps_are_the_step_over_at_the_widest_place() {
     }
 }
 
+/// Of curves the distance to the next pass is not that of two lines of the surface: the page has no chart of it.
+#[test]
+fn curved_passes_have_words_of_their_own() {
+    let (_, sketch, findings) = run(&format!("{BELL}spacing = \"constant\"\n"));
+    let folder = tempfile::tempdir().unwrap();
+    let path = sketch
+        .write(
+            folder.path(),
+            Path::new("bell.toml"),
+            &findings,
+            &Remarks::default(),
+        )
+        .unwrap();
+    let page = std::fs::read_to_string(path).unwrap();
+    assert_well_formed(&page);
+    assert!(page.contains("Each pass is a curve") && !page.contains("passes of constant v crowd"));
+    assert!(page.contains("\"gaps\":{\"narrowest\":[],\"pass\":[],\"widest\":[]}"));
+}
+
 #[test]
 fn a_run_that_ended_at_once_is_reported_all_the_same() {
     let (job, _, findings) = run(BELL);

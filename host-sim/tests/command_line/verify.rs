@@ -36,6 +36,31 @@ fn remedies_for_a_scallop_help() {
     assert!(found["scallop_max_mm"].as_f64().unwrap() <= 0.005, "{found}");
 }
 
+/// A ball that does not fit at the first place: nothing is called met that was measured on no sample.
+#[test]
+fn a_run_without_a_sample_meets_nothing() {
+    let folder = folder_with("torus", &[("radius_mm = 5", "radius_mm = 900")]);
+    let output = run(folder.path(), "verify job.toml --json");
+    let found: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    assert_eq!(found["samples"], 0, "{found}");
+    assert_eq!(
+        (&found["passed"], &found["gouge_max_mm"]),
+        (&false.into(), &Value::Null)
+    );
+    assert!(
+        found["not_measured"]
+            .as_array()
+            .unwrap()
+            .contains(&"gouge_max_mm".into())
+    );
+    let told = out(&run(folder.path(), "verify job.toml"));
+    assert!(
+        told.contains("not measured: the run has no sample") && !told.contains("none deeper"),
+        "{told}"
+    );
+}
+
 /// A plane that leans over the tool by 10 degrees: the contact is above the ball's equator, the shank in the plane. The reported turn helps,
 /// and a holder that touches a fixture is reported with its place.
 #[test]

@@ -41,8 +41,8 @@ pub const fn patches_max(kind: SurfaceKind, store_words: usize) -> usize {
 /// Maximum spans of a surface in one direction. Bounds every loop over spans.
 pub const SPANS_MAX: u16 = 1_024;
 
-/// Maximum step per period of a job with axis limits, mm.
-pub(crate) const STEP_MAX_MM: f32 = 2.0;
+/// Maximum step per period of a job with axis limits, at the maximum override, mm.
+pub const STEP_MAX_MM: f32 = 2.0;
 
 /// Maximum cells of a path in the look-ahead, and so maximum patches of a pass of a job with axis limits.
 pub(crate) const CELLS_MAX: usize = 256;

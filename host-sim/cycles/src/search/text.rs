@@ -147,7 +147,9 @@ mod tests {
             let mut job = Genes::random(&mut random).job(class);
             if class.limits {
                 // The job file refuses more, as the core does.
-                job.feed_mm_min = job.feed_mm_min.min(60e6 / job.machine.period_us);
+                job.feed_mm_min = job
+                    .feed_mm_min
+                    .min(job_file::feed_max_within_limits(job.machine.period_us));
             }
             let mut read =
                 job_file::parse("a job", &text(&job, "one\ntwo")).unwrap_or_else(|error| panic!("{error:?}"));

@@ -2,9 +2,8 @@
 
 use super::super::{Failure, Result};
 use super::Arguments;
-use job::{FEED_MAX_MM_MIN, FEED_MIN_MM_MIN, MachineSpec, RADIUS_MAX_MM, STEP_MAX_MM};
-use job_file::TOLERANCE_MAX_MM;
-use protocol::message::OVERRIDE_MAX_PERCENT;
+use job::{FEED_MAX_MM_MIN, FEED_MIN_MM_MIN, PERIOD_DEFAULT_US, RADIUS_MAX_MM};
+use job_file::{TOLERANCE_MAX_MM, feed_max_within_limits};
 
 /// A number above `least`, at most `most`.
 fn within(name: &str, value: Option<f64>, [least, most]: [f64; 2], want: &str) -> Result<()> {
@@ -44,7 +43,7 @@ pub(super) fn check(arguments: &Arguments) -> Result<()> {
     }
     // The jobs of a part have axis limits.
     let feed_max = if arguments.part {
-        STEP_MAX_MM * 100.0 / f64::from(OVERRIDE_MAX_PERCENT) * 60e6 / MachineSpec::default().period_us
+        feed_max_within_limits(PERIOD_DEFAULT_US)
     } else {
         FEED_MAX_MM_MIN
     };
