@@ -1,5 +1,7 @@
 //! Step output of the axes: decimal numbers as written, converted to fractions without rounding.
 
+use interp_core::StepConfig;
+use interp_core::steps::{AxisSteps, PULSE_SLOTS_MAX, SETUP_SLOTS_MAX, SLOTS};
 use job::{JobError, PERIOD_RANGE_US, Ratio, StepOutput};
 use toml::de::DeValue;
 
@@ -50,20 +52,14 @@ fn fraction(text: &str) -> Option<(u32, u32)> {
     }
 }
 
-/// Longest pulse and longest direction setup time, as shares of the sampling period: limits of the core's step output.
-const PULSE_SHARE_MAX: f64 = 0.024;
-const SETUP_SHARE_MAX: f64 = 0.480;
 /// Default of the pulse and of the direction setup time, µs; limited to the longest that the period allows.
 const PULSE_DEFAULT_US: f64 = 1.0;
 const SETUP_DEFAULT_US: f64 = 5.0;
-/// Least and greatest number of steps per millimetre.
-const STEPS_PER_MM_MIN: f64 = 1e-3;
-const STEPS_PER_MM_MAX: f64 = 500_000.0;
 
 /// Longest pulse and longest direction setup time at a sampling period, µs.
 #[must_use]
 pub fn slots_max_us(period_us: f64) -> [f64; 2] {
-    [PULSE_SHARE_MAX, SETUP_SHARE_MAX].map(|share| share * period_us)
+    [u16::from(PULSE_SLOTS_MAX), SETUP_SLOTS_MAX].map(|most| f64::from(most) / f64::from(SLOTS) * period_us)
 }
 
 /// Steps per millimetre of one axis.
@@ -83,8 +79,16 @@ fn axis(value: &Value<'_, '_>) -> Result<Ratio, JobError> {
             WANT,
         )
     })?;
-    let steps_per_mm = f64::from(numerator) / f64::from(denominator);
-    if !(STEPS_PER_MM_MIN..=STEPS_PER_MM_MAX).contains(&steps_per_mm) {
+    let steps = AxisSteps {
+        steps: numerator,
+        mm: denominator,
+        inverted: false,
+    };
+    let config = StepConfig {
+        axes: [steps; 3],
+        ..StepConfig::DEFAULT
+    };
+    if config.check().is_err() {
         let what = format!("must be from 1/1000 to 500000, not {numerator}/{denominator}");
         return Err(value.error(&what, WANT));
     }
@@ -234,6 +238,7 @@ mod tests {
             ("[400, 400]", "3 numbers"),
             ("[400, 0, 400]", "1/1000"),
             ("[400, 500001, 400]", "1/1000"),
+            (r#"[400, "1/1001", 400]"#, "1/1000"),
             ("[400, -4.5, 400]", "a number of steps"),
             (r#"[400, "5/0", 400]"#, "1/1000"),
             (r#"[400, "a/5", 400]"#, "a number of steps"),
