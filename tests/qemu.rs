@@ -86,7 +86,7 @@ fn compare_prepared(jobs: &[(&str, Prepared)]) {
             "{name}: {:.0} ticks a second",
             samples as f64 / start.elapsed().as_secs_f64()
         );
-        assert_eq!(compared.first_bad_pass, None, "{name}");
+        assert_eq!(compared.first_bad_index, None, "{name}");
         assert_eq!(
             (compared.samples, compared.status.digest),
             (samples, digest),
@@ -273,7 +273,7 @@ fn the_first_difference_is_named() {
     let (_qemu, mut session) = board();
     drive::upload(&mut session, &theirs, |_| {}).unwrap();
     let compared = drive::run_digests(&mut session, &passes, true, None, |_| {}).unwrap();
-    let pass = compared.first_bad_pass.unwrap();
+    let pass = compared.first_bad_index.unwrap();
     assert_eq!(pass, mine[tick as usize].pass);
     let first = passes[pass as usize].first_tick;
     let there = drive::samples_between(&mut session, first, passes[pass as usize].samples).unwrap();

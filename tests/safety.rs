@@ -481,7 +481,7 @@ fn an_operator_commands_a_run_that_is_followed() {
     assert!(compared.status.samples < undisturbed().1);
     // A status request is no command, so the passes are compared; the run has more passes than the empty list expected.
     let (compared, _) = run(vec![Request::Status]);
-    assert_eq!((compared.commanded, compared.first_bad_pass), (false, Some(0)));
+    assert_eq!((compared.commanded, compared.first_bad_index), (false, Some(0)));
 
     // If the operator holds the run and disconnects, the host does not wait for its end.
     let mut desk = Desk::ready();

@@ -108,7 +108,7 @@ fn regions_of_more_patches_than_the_store() {
         drive::upload(&mut session, &job, |_| {}).unwrap();
         let ran = drive::run_digests(&mut session, &wanted, true, None, |_| {}).unwrap();
         assert_eq!(ran.status.state, State::Finished, "{:?}", ran.status);
-        assert_eq!(ran.first_bad_pass, None, "{ran:?}");
+        assert_eq!(ran.first_bad_index, None, "{ran:?}");
         assert_eq!(Some(ran.status.digest), wanted.last().map(|pass| pass.digest));
         assert_eq!(ran.status.stream.received as usize, job.words.len());
     }

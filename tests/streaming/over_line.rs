@@ -151,7 +151,7 @@ impl Bench {
         let wanted = expected(&self.job);
         let ran = drive::run_digests(&mut session, &wanted, lockstep, None, |_| {}).unwrap();
         assert_eq!(ran.status.state, State::Finished, "{:?}", ran.status);
-        assert_eq!(ran.first_bad_pass, None, "{ran:?}");
+        assert_eq!(ran.first_bad_index, None, "{ran:?}");
         assert_eq!(Some(ran.status.digest), wanted.last().map(|pass| pass.digest));
         ran.status
     }

@@ -92,14 +92,14 @@ pub fn by_digest(
     let compared = drive::run_digests(session, &expected, lockstep, operator, progress)?;
     let ticks_per_second = rate(compared.samples, start);
     let mut first_difference = None;
-    if let Some(pass) = compared.first_bad_pass {
-        let from = expected.get(pass as usize).map_or_else(
+    if let Some(index) = compared.first_bad_index {
+        let from = expected.get(index as usize).map_or_else(
             || expected.last().map_or(0, |last| last.first_tick + last.samples),
             |pass| pass.first_tick,
         );
         first_difference = Some(from.into());
         if lockstep {
-            let count = expected.get(pass as usize).map_or(0, |pass| pass.samples) + 1;
+            let count = expected.get(index as usize).map_or(0, |pass| pass.samples) + 1;
             let there = drive::samples_between(session, from, count)?;
             let there = &there[..there.len().min(count as usize)];
             let ours = samples_of(reference, from, count)?;

@@ -27,8 +27,8 @@ pub struct Compared {
     pub status: Status,
     /// Number of samples whose digest (or every bit) was compared.
     pub samples: u64,
-    /// Number of passes that differ, are missing or are surplus; the first of them.
-    pub first_bad_pass: Option<u32>,
+    /// Index into the expected passes of the first one that differs or is missing; their count for a surplus pass.
+    pub first_bad_index: Option<u32>,
     /// An operator changed the run, so that nothing was compared.
     pub commanded: bool,
     /// What the line lost.
@@ -204,7 +204,7 @@ pub fn run_digests(
                 return Ok(Compared {
                     status,
                     samples: passes.samples,
-                    first_bad_pass: passes.first_bad.filter(|_| !following.commanded),
+                    first_bad_index: passes.first_bad.filter(|_| !following.commanded),
                     commanded: following.commanded,
                     losses: session.losses(),
                 });

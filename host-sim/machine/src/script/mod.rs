@@ -8,7 +8,7 @@
 //! tick 1500: override 100
 //! ```
 //!
-//! A line is `tick N: ACTION`, ACTION one of `hold`, `resume`, `stop`, `abort`, `start`, `override P` (percent, 0 to 200); `#` begins a
+//! A line is `tick N: ACTION`, ACTION one of `hold`, `pause`, `resume`, `stop`, `abort`, `start`, `override P` (percent, 0 to 200); `#` begins a
 //! comment. N counts periods from the one that begins the first run, which is 0 and starts implicitly; N never decreases. A period takes one
 //! request and one override. A request that the state does not allow is ignored, as on the machine.
 
