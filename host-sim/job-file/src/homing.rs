@@ -46,7 +46,7 @@ pub(super) fn read(
     let order = read_order(home)?;
     let at_upper_end = switches(home, "at_upper_end", [false, false, true])?;
     let position_mm = if home.has("position_mm") {
-        home.numbers("position_mm")?
+        home.positions("position_mm")?
     } else {
         std::array::from_fn(|axis| travel_mm[axis][usize::from(at_upper_end[axis])])
     };
@@ -58,6 +58,7 @@ pub(super) fn read(
     let back_off_mm = home
         .positive_axes("back_off_mm", ABOVE_0)?
         .unwrap_or([BACK_OFF_MM; 3]);
+    home.check_positions("back_off_mm", &back_off_mm)?;
     for (index, axis) in AXES.into_iter().enumerate() {
         let (seek, approach, most) = (
             seek_mm_s[index],

@@ -40,7 +40,7 @@ pub use file::{
 pub use program::jobs_of;
 pub use steps::slots_max_us;
 
-/// How far the surface of a face goes on beyond it, in step-overs on a plane: passes begin and end half a step-over beside it, which on hollow places
+/// How far the surface of a face goes on beyond it, in step-overs on a plane: passes begin and end half a step-over beside it, which on concave places
 /// is twice as long.
 pub const STEP_OVERS_AROUND: f64 = 1.1;
 
@@ -272,7 +272,7 @@ fn around_mm(document: &Section<'_>) -> Result<f64, JobError> {
         Some(section) => placement::read(&section)?.scale,
         None => 1.0,
     };
-    Ok(STEP_OVERS_AROUND * (8.0 * radius_mm * scallop_mm.max(0.0)).sqrt() / scale)
+    Ok(STEP_OVERS_AROUND * job::plane_step_over_mm(radius_mm, scallop_mm.max(0.0)) / scale)
 }
 
 /// Makes the region of a job from its face and its part.

@@ -175,10 +175,12 @@ fn read(machine: &Section<'_>) -> Result<MachineSpec, JobError> {
     read.step_output = steps::read(machine, read.period_us)?;
     read.travel_mm = read_travel(machine)?;
     if machine.has("home_mm") {
-        read.home_mm = Some(machine.numbers("home_mm")?);
+        read.home_mm = Some(machine.positions("home_mm")?);
     }
     if machine.has("safe_z_mm") {
-        read.safe_z_mm = Some(machine.number("safe_z_mm")?);
+        let safe_z_mm = machine.number("safe_z_mm")?;
+        machine.check_positions("safe_z_mm", &[safe_z_mm])?;
+        read.safe_z_mm = Some(safe_z_mm);
     }
     for (key, value) in [
         ("clearance_mm", &mut read.clearance_mm),
@@ -198,6 +200,7 @@ fn read_travel(machine: &Section<'_>) -> Result<Option<[[f64; 2]; 3]>, JobError>
         return Ok(None);
     }
     let travel: [[f64; 2]; 3] = machine.matrix("travel_mm")?;
+    machine.check_positions("travel_mm", travel.as_flattened())?;
     for (range, axis) in travel.iter().zip(AXES) {
         if range[0] >= range[1] {
             let what = format!(

@@ -6,7 +6,7 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use job::{JobError, Origin};
+use job::{JobError, Origin, units};
 
 /// Largest edit distance (insert, delete, replace) between an unknown key and a suggested one, as a share of the length: beyond a third
 /// a suggestion misleads.
@@ -292,6 +292,25 @@ impl<'t> Section<'t> {
                 format!("`{key}` must be true or false, not {}", kind_of(other)),
                 format!("write {key} = true, or leave it out"),
             )),
+        }
+    }
+
+    /// Machine positions, mm.
+    pub(super) fn positions<const N: usize>(&self, key: &str) -> Result<[f64; N], JobError> {
+        let positions = self.numbers(key)?;
+        self.check_positions(key, &positions)?;
+        Ok(positions)
+    }
+
+    /// Checks that lengths in mm are within the range of the machine's positions.
+    pub(super) fn check_positions(&self, key: &str, lengths_mm: &[f64]) -> Result<(), JobError> {
+        match lengths_mm.iter().find(|mm| units::nanometres(**mm).is_none()) {
+            Some(mm) => Err(self.error(
+                key,
+                format!("`{key}` reaches {mm} mm; {}", units::POSITION_RANGE),
+                "give a length in mm within that range",
+            )),
+            None => Ok(()),
         }
     }
 

@@ -1,6 +1,6 @@
 //! Every kind of bad input yields its line, a message and a remedy; the sample jobs are valid.
 
-use job::{AxisLimits, HeartbeatAction, Job, JobError, MachineSpec, NurbsSpec, SurfaceSpec};
+use job::{AxisLimits, HeartbeatAction, Job, JobError, MachineSpec, NurbsSpec, SurfaceSpec, units};
 
 use super::*;
 
@@ -141,6 +141,20 @@ fn a_profile_has_the_machines_keys_only() {
         ("[tool]\n", "unknown section `tool`"),
     ] {
         assert_eq!(parse_profile("machine.toml", text).unwrap_err().what(), what);
+    }
+}
+
+/// Positions and distances of axes that are not homed, too.
+#[test]
+fn homing_is_within_the_machines_range() {
+    for (key, what) in [
+        ("position_mm = [-400, 2200, 200]", "`position_mm` reaches 2200 mm"),
+        ("back_off_mm = [1, 2200, 1]", "`back_off_mm` reaches 2200 mm"),
+    ] {
+        let text = format!("{PROFILE}[home]\norder = \"zx\"\n{key}\n");
+        let error = parse_profile("machine.toml", &text).unwrap_err();
+        assert_eq!(error.what(), format!("{what}; {}", units::POSITION_RANGE));
+        assert_eq!(error.line_and_column().unwrap().0, text.lines().count());
     }
 }
 
@@ -312,6 +326,9 @@ fn ranges() {
         (REVOLVED, "1000", "1", 21, 13, "`period_us` must be 10 to 100000, not 1"),
         (REVOLVED, "[100, 100, 50]", "[100, 0, 50]", 22, 21, "`velocity_max_mm_s` must be above 0, not 0"),
         (REVOLVED, "[-500, 500]", "[500, -500]", 25, 13, "the travel of x must ascend"),
+        (REVOLVED, "[-500, 500]", "[-500, 5000]", 25, 13, "`travel_mm` reaches 5000 mm; the machine's range is ±2147.483 mm"),
+        (REVOLVED, "period_us = 1000", "home_mm = [3000, 0, 10]", 21, 11, "`home_mm` reaches 3000 mm; the machine's range is ±2147.483 mm"),
+        (REVOLVED, "period_us = 1000", "safe_z_mm = -2147.484", 21, 13, "`safe_z_mm` reaches -2147.484 mm; the machine's range is ±2147.483 mm"),
         (REVOLVED, "period_us = 1000", "host_gone = \"stop\"", 21, 13, "`host_gone` cannot be \"stop\""),
         (REVOLVED, "feed_mm_min = 600", "feed_mm_min = 60001", 13, 15, "`feed_mm_min` must be at most 60000 on a machine with limits and a period of 1000 us, not 60001"),
         (REVOLVED, "period_us = 1000", "host_gone_ms = 99", 21, 16, "`host_gone_ms` must be 100 to 60000, not 99"),

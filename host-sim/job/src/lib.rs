@@ -10,6 +10,7 @@ mod region;
 mod setup;
 mod surface;
 mod text;
+pub mod units;
 
 pub use error::JobError;
 pub use machine::{
@@ -179,4 +180,16 @@ impl Job {
     pub fn feed_mm_s(&self) -> f64 {
         self.feed_mm_min / 60.0
     }
+
+    /// The step-over on a plane, mm.
+    #[must_use]
+    pub fn plane_step_over_mm(&self) -> f64 {
+        plane_step_over_mm(self.radius_mm, self.scallop_mm)
+    }
+}
+
+/// The step-over of a ball on a plane, mm, at a scallop height far below its radius: sqrt(8 r h).
+#[must_use]
+pub fn plane_step_over_mm(radius_mm: f64, scallop_mm: f64) -> f64 {
+    (8.0 * radius_mm * scallop_mm).sqrt()
 }

@@ -70,6 +70,11 @@ impl Region {
 const FULL_SHARE: f64 = 0.98;
 /// Lines near an end that are looked at beside those through vertices.
 const LINES_AT_END: u32 = 16;
+/// How far from an end of a region its last line may be, in step-overs of a plane: what is beyond it stays below the scallop height down to a convex
+/// radius of a tenth of the ball's.
+const END_STEPS: f64 = 0.15;
+/// Ends that are nearer to the surface's boundary than this share of the side parameter's range are on it: passes follow it.
+const ON_BOUNDARY: f64 = 1e-9;
 
 impl Region {
     /// `[path, side]` of (u, v), and back.
@@ -92,15 +97,30 @@ impl Region {
         pairs.iter().map(|[from, to]| to - from).sum()
     }
 
-    /// The first and the last side parameter whose line is as long as any that is at most so far `within` from the region's end. On an end that is nearly parallel to the lines the
-    /// last one would be a sliver, and what is below it a step-over from the one before.
-    #[must_use]
-    pub fn full_lines(&self, along: Along, within: f64) -> [f64; 2] {
+    /// The least and the greatest side parameter.
+    fn ends(&self, along: Along) -> [f64; 2] {
         let [u, v] = self.extent();
-        let [_, ends] = match along {
-            Along::U => [u, v],
-            Along::V => [v, u],
-        };
+        match along {
+            Along::U => v,
+            Along::V => u,
+        }
+    }
+
+    /// The side parameters of the first and the last line: the region's ends, or, where a line there would be a sliver, at most 0.15 step-overs inwards. An
+    /// end on the boundary of the surface stays. `step_mm`: step-over on a plane; `across_mm`: length of the surface's derivative by the side parameter;
+    /// `sides`: range of the side parameter on the surface.
+    #[must_use]
+    pub fn trimmed_lines(&self, along: Along, step_mm: f64, across_mm: f64, sides: [f64; 2]) -> [f64; 2] {
+        let ends = self.ends(along);
+        let full = self.full_lines(along, END_STEPS * step_mm / across_mm);
+        let on_boundary = |k: usize| (ends[k] - sides[k]).abs() <= ON_BOUNDARY * (sides[1] - sides[0]);
+        [0, 1].map(|k| if on_boundary(k) { ends[k] } else { full[k] })
+    }
+
+    /// The first and the last side parameter whose line is (nearly) the longest of those up to `within` from the region's end. On an end nearly parallel to the
+    /// lines the last line would be a sliver, and the strip beside it a step-over wide.
+    fn full_lines(&self, along: Along, within: f64) -> [f64; 2] {
+        let ends = self.ends(along);
         let within = within.min(0.25 * (ends[1] - ends[0]));
         let vertices: Vec<f64> = self
             .edges()
@@ -189,6 +209,19 @@ mod tests {
         let turned = Region::new(vec![vec![[0.0, 0.0], [0.0, 10.0], [5.0, 10.0], [4.95, 0.0]]]);
         let [_, last] = turned.full_lines(Along::V, 0.1);
         assert!((last - 4.95).abs() < 2e-3, "{last}");
+    }
+
+    /// An end on the surface's boundary stays where one within it is cut; a step-over of 2/3 mm at 1 mm for each unit reaches 0.1 far.
+    #[test]
+    fn a_sliver_on_the_boundary_stays() {
+        let region = Region::new(vec![vec![[0.0, 0.0], [10.0, 0.0], [10.0, 5.0], [0.0, 4.95]]]);
+        let lines = |sides: [f64; 2]| region.trimmed_lines(Along::U, 0.1 / END_STEPS, 1.0, sides);
+        assert_eq!(lines([-1.0, 5.0]), [0.0, 5.0]);
+        let [first, last] = lines([0.0, 5.1]);
+        assert!(first == 0.0 && (last - 4.95).abs() < 2e-3, "{last}");
+        // Half as far on a surface with derivatives twice as long.
+        let [_, last] = region.trimmed_lines(Along::U, 0.1 / END_STEPS, 4.0, [0.0, 5.1]);
+        assert!(last > 4.97, "{last}");
     }
 
     #[test]

@@ -43,7 +43,7 @@ pub(crate) fn settle(job: &mut Job) {
             let costs = Costs {
                 surface: SurfaceEvaluator::new(&job.surface),
                 along: job.along,
-                step_mm: (8.0 * job.radius_mm * job.scallop_mm).sqrt(),
+                step_mm: job.plane_step_over_mm(),
                 feed_mm_s: job.feed_mm_s(),
                 link_s: if limits.is_some() { LINK_S } else { 0.0 },
                 speed_mm_s: speed,
@@ -62,18 +62,13 @@ pub(crate) fn settle(job: &mut Job) {
     }
 }
 
-/// How far from an end of a cell its last line may be, in step-overs of a plane: what is beyond it stays below the scallop height down to a convex radius of a tenth of the ball's.
-const END_STEPS: f64 = 0.15;
-/// Ends that are nearer to the surface's boundary than this share of the side parameter's range are on it: passes follow it.
-const ON_BOUNDARY: f64 = 1e-9;
-
 /// The cells of a region that is made from a face, without ends on which the first or the last line would be a sliver.
 fn without_slivers(job: &Job, region: &Region, cells: Vec<Vec<Polygon>>) -> Vec<Vec<Polygon>> {
     if job.origin.reach().is_none() {
         return cells;
     }
     let surface = SurfaceEvaluator::new(&job.surface);
-    let step_mm = (8.0 * job.radius_mm * job.scallop_mm).sqrt();
+    let step_mm = job.plane_step_over_mm();
     let [u, v] = job.surface.domain();
     let sides = if job.along == Along::U { v } else { u };
     let mut is_cut = false;
@@ -89,9 +84,7 @@ fn without_slivers(job: &Job, region: &Region, cells: Vec<Vec<Polygon>>) -> Vec<
                 Along::U => (frame.v.length(), [v0, v1]),
                 Along::V => (frame.u.length(), [u0, u1]),
             };
-            let full = cell.full_lines(job.along, END_STEPS * step_mm / across_mm);
-            let on_boundary = |k: usize| (ends[k] - sides[k]).abs() <= ON_BOUNDARY * (sides[1] - sides[0]);
-            let lines = [0, 1].map(|k| if on_boundary(k) { ends[k] } else { full[k] });
+            let lines = cell.trimmed_lines(job.along, step_mm, across_mm, sides);
             if lines == ends {
                 return cell.loops;
             }

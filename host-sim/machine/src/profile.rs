@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use interp_core::StepConfig;
 use job::{
     AXES, AxisLimits, Contact, HeartbeatAction, MachineProfile, PERIOD_DEFAULT_US, Ratio, SpindleDrive,
-    StepOutput,
+    StepOutput, units,
 };
 use protocol::message::{
     AtSpeed, DoorContact, LinkTimeoutAction, Profile, SpindleOrder, SpindleSettings, Turning,
@@ -13,7 +13,6 @@ use protocol::message::{
 
 use crate::prepare;
 
-const NM_PER_MM: f64 = 1e6;
 const US_PER_MS: f64 = 1e3;
 
 /// The profile in the board's form, by its period.
@@ -85,7 +84,7 @@ pub fn of_board(profile: &Profile) -> MachineProfile {
             acceleration_mm_s2: decimal(acceleration_mm_s2),
             jerk_mm_s3: decimal(jerk_mm_s3),
         },
-        travel_mm: travel_nm.map(|travel| travel.map(|range| range.map(|nm| f64::from(nm) / NM_PER_MM))),
+        travel_mm: travel_nm.map(|travel| travel.map(|range| range.map(units::millimetres))),
         homing_required: configuration.homing_required,
         heartbeat_action: match configuration.on_link_timeout {
             LinkTimeoutAction::Finish => HeartbeatAction::Finish,
@@ -152,10 +151,9 @@ pub fn spindle_order(spindle: Option<job::Spindle>) -> SpindleOrder {
     })
 }
 
-/// A length in nm.
-#[allow(clippy::cast_possible_truncation, reason = "the cast saturates")]
+/// A length in nm. The file's reader refuses lengths outside the machine's range, so the ends of the range stand for what no profile has.
 fn nm(mm: f64) -> i32 {
-    (mm * NM_PER_MM).round() as i32
+    units::nanometres(mm).unwrap_or(if mm < 0.0 { i32::MIN } else { i32::MAX })
 }
 
 #[allow(clippy::cast_possible_truncation, reason = "the board's precision")]
@@ -172,14 +170,13 @@ fn homing_for_board(homing: &job::Homing) -> protocol::message::Homing {
 }
 
 fn homing_of_board(homing: &protocol::message::Homing) -> job::Homing {
-    let mm = |nm: i32| f64::from(nm) / NM_PER_MM;
     job::Homing {
         order: homing.order,
         at_upper_end: homing.at_upper_end,
-        position_mm: homing.position_nm.map(mm),
+        position_mm: homing.position_nm.map(units::millimetres),
         seek_mm_s: decimal(homing.seek_mm_s),
         approach_mm_s: decimal(homing.approach_mm_s),
-        back_off_mm: homing.back_off_nm.map(mm),
+        back_off_mm: homing.back_off_nm.map(units::millimetres),
         survives_off: homing.survives_off,
     }
 }

@@ -7,10 +7,9 @@ use interp_core::Sample;
 
 use crate::Machine;
 use crate::prepare::{Prepared, prepare};
-use job::{AXES, Job, JobError, MachineSpec};
+use job::{AXES, Job, JobError, MachineSpec, units};
 use patches::placement::extent_mm;
 
-const MM_PER_NM: f64 = 1e-6;
 /// Key of the job at which the error points.
 const KEY: &str = "machine.travel_mm";
 
@@ -37,7 +36,7 @@ pub fn check(job: &Job) -> Result<(), JobError> {
     if fits {
         return Ok(());
     }
-    // The passes do not depend on the axis limits.
+    // Without the axis limits the run is shorter. Passes of constant scallop height then differ by micrometres; the core checks the true ones.
     let mut bare = job.clone();
     bare.machine = MachineSpec {
         period_us: job.machine.period_us,
@@ -95,12 +94,12 @@ fn farthest(prepared: &Prepared) -> Option<[[ExtremeSample; 2]; 3]> {
     // Samples up to a fault are used.
     let _fault = machine.run(|sample| {
         let at = |axis: usize| ExtremeSample {
-            mm: f64::from(sample.cl_nm[axis]) * MM_PER_NM,
+            mm: units::millimetres(sample.cl_nm[axis]),
             sample: *sample,
         };
         let ends = farthest.get_or_insert_with(|| std::array::from_fn(|axis| [at(axis); 2]));
         for (axis, [least, most]) in ends.iter_mut().enumerate() {
-            let here = f64::from(sample.cl_nm[axis]) * MM_PER_NM;
+            let here = units::millimetres(sample.cl_nm[axis]);
             if here < least.mm {
                 *least = at(axis);
             }

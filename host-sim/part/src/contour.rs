@@ -46,7 +46,7 @@ pub struct Set<'a> {
     pub finer: [f64; 2],
     /// Whether a place is in it.
     pub holds: &'a (dyn Fn(Place) -> bool + Sync),
-    /// Whether a place of it is so far inside that four such around a cell of the grid have no place outside between them.
+    /// Whether a place is deep enough inside: a grid cell with four such corners lies inside as a whole.
     pub is_sure: &'a (dyn Fn(Place) -> bool + Sync),
 }
 

@@ -202,9 +202,7 @@ impl<'a> Links<'a> {
             },
             may_stay_low: of_part.is_some(),
             times: Times::new(job.feed_mm_s(), job.machine.limits.unwrap_or(AxisLimits::DEFAULT)),
-            straight_mm: of_part.map_or(0.0, |_| {
-                STRAIGHT_STEPS * (8.0 * job.radius_mm * job.scallop_mm).sqrt()
-            }),
+            straight_mm: of_part.map_or(0.0, |_| STRAIGHT_STEPS * job.plane_step_over_mm()),
         }
     }
 

@@ -16,7 +16,7 @@ use crate::triangle::edge_nearest;
 
 /// Half a step-over, and what is left for the ends of passes.
 pub const GROWTH: f64 = 0.51;
-/// Steps on hollow places are longer than on a plane; by so much at most.
+/// Greatest ratio of the step-over on a concave place to that on a plane.
 pub const STEP_MAX: f64 = 2.0;
 /// Places a side at which a face is looked at for its step-over and metric.
 const LOOKS: usize = 24;
@@ -159,7 +159,7 @@ impl Request<'_> {
     /// Looks at the face.
     fn looks(&self, rectangle: [[f64; 2]; 2]) -> Looks {
         let r = self.tool.radius;
-        let plane = (8.0 * r * self.scallop_mm).sqrt();
+        let plane = job::plane_step_over_mm(r, self.scallop_mm);
         let (mut metric, mut of_centre, mut step) = ([1e-9_f64; 2], [0.0_f64; 2], plane);
         let clearance = self.clearance();
         for i in 0..=LOOKS {

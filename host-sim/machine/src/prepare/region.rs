@@ -291,8 +291,7 @@ fn least(job: &Job, prepared: &Prepared) -> i32 {
             }
         }
     }
-    let step_over_mm = (8.0 * job.radius_mm * job.scallop_mm).sqrt();
-    let places = LEAST_SHARE * step_over_mm / most_mm * f64::from(1 << FRACTION_BITS);
+    let places = LEAST_SHARE * job.plane_step_over_mm() / most_mm * f64::from(1 << FRACTION_BITS);
     (places.floor() as i32).max(1)
 }
 

@@ -16,6 +16,7 @@ mod rotation;
 
 use std::fmt;
 
+use job::units::POSITION_RANGE;
 use job::{AXES, NurbsSpec, SurfaceSpec};
 
 pub use extent::{EXTENT_TOLERANCE_MM, extent_mm};
@@ -79,7 +80,7 @@ impl fmt::Display for OutOfMachineRange {
         let axis = AXES.get(self.axis).copied().unwrap_or("?");
         write!(
             out,
-            "the placed surface extends from {axis} = {least:.3} to {most:.3} mm; the machine's range is ±2147.483 mm"
+            "the placed surface extends from {axis} = {least:.3} to {most:.3} mm; {POSITION_RANGE}"
         )
     }
 }

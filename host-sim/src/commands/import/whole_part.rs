@@ -100,7 +100,7 @@ pub(super) fn command(arguments: &Arguments, file: &str, model: &Arc<Model>, out
         tolerance_mm: arguments.tolerance,
         untrimmed: false,
         parameters: FaceParameters::Edges,
-        around_mm: STEP_OVERS_AROUND * (8.0 * radius_mm * scallop_mm).sqrt(),
+        around_mm: STEP_OVERS_AROUND * job::plane_step_over_mm(radius_mm, scallop_mm),
     };
     let tool = Tool::new(radius_mm, &job::ToolBody::default());
     let wanted = |face: &&Face| arguments.faces.is_empty() || arguments.faces.contains(&face.number);
@@ -164,7 +164,7 @@ pub(super) fn reaches(
         tolerance_mm: arguments.tolerance,
         untrimmed: false,
         parameters: FaceParameters::Edges,
-        around_mm: STEP_OVERS_AROUND * (8.0 * radius_mm * scallop_mm).sqrt(),
+        around_mm: STEP_OVERS_AROUND * job::plane_step_over_mm(radius_mm, scallop_mm),
     };
     let setup = Setup::new(Up::PlusZ, model, scallop_mm);
     let asked = Asked {

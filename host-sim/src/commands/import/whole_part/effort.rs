@@ -17,8 +17,6 @@ const HIGHER: f64 = 1.03;
 const BESIDE: usize = 3;
 /// Share of the area that may be left for the faster direction.
 const LEFT_SHARE: f64 = 0.005;
-/// How far from an end of the region the last line may be, in step-overs, as for cells.
-const END_STEPS: f64 = 0.15;
 
 /// What the passes are made for.
 #[derive(Clone, Copy)]
@@ -112,26 +110,11 @@ impl Passes<'_> {
             .edges()
             .map(|ends| ends.map(|end| swapped(along, end)))
             .collect();
-        let [low, high] = self.region.full_lines(along, 0.0);
-        // As for cells: the last line is no sliver.
         let [u, v] = self.region.extent().map(|[low, high]| 0.5 * (low + high));
         let [path, side] = swapped(along, [u, v]);
         let [_, across, _] = self.speeds(along, path, side);
-        let full = self
-            .region
-            .full_lines(along, END_STEPS * self.step_over_mm / across);
         let [_, sides] = swapped_ranges(along, self.surface.domain());
-        let slack = 1e-9 * (sides[1] - sides[0]);
-        let low = if (low - sides[0]).abs() <= slack {
-            low
-        } else {
-            full[0]
-        };
-        let high = if (high - sides[1]).abs() <= slack {
-            high
-        } else {
-            full[1]
-        };
+        let [low, high] = self.region.trimmed_lines(along, self.step_over_mm, across, sides);
         let least = (high - low) / LINES_MAX as f64;
         let (mut lines, mut time_s) = (Vec::new(), 0.0);
         let mut side = low;

@@ -263,6 +263,7 @@ fn settle(
     if let Some(reach) = job.origin.reach() {
         outcome.reach = Some(reach.clone());
     }
+    let step_over_mm = job.plane_step_over_mm();
     let Some(region) = job.region else {
         return;
     };
@@ -275,7 +276,7 @@ fn settle(
     let passes = Passes {
         surface: &surface,
         region: &region,
-        step_over_mm: (8.0 * job.radius_mm * job.scallop_mm).sqrt(),
+        step_over_mm,
         feed_mm_s: job.feed_mm_min / 60.0,
         is_zigzag: job.pattern == Pattern::Zigzag,
         places: &places,
