@@ -321,6 +321,34 @@ fn a_probe_move_latches_where_the_plate_was_touched() {
     }
 }
 
+/// A NaN would pass every bound but the profile's velocity; at 0 or less the move would take days.
+#[test]
+fn only_a_finite_speed_above_0_is_one() {
+    let mut rig = Rig::homable([100 * MM, 100 * MM, -30 * MM]);
+    let before = rig.motion();
+    let probe = |speed_mm_s| Request::Probe {
+        axis: 2,
+        nm: -10 * MM,
+        speed_mm_s,
+    };
+    let jog = |speed_mm_s| Request::Jog {
+        way: JogWay::By { nm: [MM, 0, 0] },
+        speed_mm_s,
+    };
+    for mm_s in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 0.0, -0.0, -2.0] {
+        for request in [probe(mm_s), jog(mm_s)] {
+            let refused = rig.ask(&request);
+            assert!(
+                matches!(refused, Err(Reason::BadSpeed { mm_s: told }) if told.to_bits() == mm_s.to_bits()),
+                "{request:?}: {refused:?}"
+            );
+        }
+    }
+    assert_eq!(rig.motion(), before);
+    rig.ask(&jog(2.0)).unwrap();
+    assert_eq!(rig.until_rest().end, MotionEnd::Done);
+}
+
 #[test]
 fn a_board_without_a_profile_moves_nothing() {
     let mut rig = Rig::new([0; 3]);

@@ -22,7 +22,7 @@ mod setup;
 use interp_core::positioning::Line;
 use protocol::{
     digest::Digest,
-    message::{Activity, InputLines, JogWay, MotionEnd, MotionStatus},
+    message::{Activity, InputLines, JogWay, MotionEnd, MotionStatus, Reason},
 };
 
 use self::{contact::Contact, homing::Homing};
@@ -68,6 +68,20 @@ pub enum Motion {
     },
     /// Along the ramp.
     Stop,
+}
+
+impl Motion {
+    /// Refuses a speed that is not a finite one above 0: compared with a bound, a NaN would pass as any speed.
+    fn check_speed(self) -> Result<(), Reason> {
+        let (Self::Jog { speed_mm_s, .. } | Self::Probe { speed_mm_s, .. }) = self else {
+            return Ok(());
+        };
+        if speed_mm_s.is_finite() && speed_mm_s > 0.0 {
+            Ok(())
+        } else {
+            Err(Reason::BadSpeed { mm_s: speed_mm_s })
+        }
+    }
 }
 
 /// What a tick of the motion changes for the rest of the board.

@@ -69,6 +69,7 @@
 //! | a probe move while the probe is tripped | `Nak`, `ProbeTripped` | |
 //! | a probe move while the spindle turns | `Nak`, `SpindleTurns` | |
 //! | a jog at a feed override of 0 | `Nak`, `NoFeed` | |
+//! | a jog or probe move whose speed is not a finite one above 0 | `Nak`, `BadSpeed` with the speed | |
 //! | a spindle on a machine without one | `Nak`, `NoSpindle` | |
 //! | a start of a streamed job whose first rows were overwritten | `Nak`, `RowsGone` | |
 //! | a start at a pass, of a job without axis limits or of a streamed one | `Nak`, `WholeOnly` | |

@@ -167,6 +167,11 @@ pub enum Reason {
     },
     /// 37: the last run was not one of this job, or came to its end.
     NothingToResume,
+    /// 38: the speed of a jog or probe move is not a finite one above 0.
+    BadSpeed {
+        /// The requested speed, mm/s.
+        mm_s: f32,
+    },
 }
 
 impl Reason {
@@ -212,6 +217,7 @@ impl Reason {
             Self::NoStoredJob => 35,
             Self::NoRoom { .. } => 36,
             Self::NothingToResume => 37,
+            Self::BadSpeed { .. } => 38,
         }
     }
 
@@ -394,6 +400,7 @@ impl fmt::Display for Reason {
                 formatter,
                 "the last run was not one of this job, or came to its end"
             ),
+            Self::BadSpeed { mm_s } => write!(formatter, "the speed must be above 0 mm/s, not {mm_s}"),
         }
     }
 }

@@ -357,6 +357,7 @@ pub(super) fn reasons() -> Vec<Reason> {
         Reason::NoStoredJob,
         Reason::NoRoom { words: 300 },
         Reason::NothingToResume,
+        Reason::BadSpeed { mm_s: -0.5 },
     ]
 }
 

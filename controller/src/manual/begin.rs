@@ -43,6 +43,7 @@ impl Manual {
         if self.is_active() {
             return Err(Reason::Moving);
         }
+        motion.check_speed()?;
         let setup = self.setup.ok_or(Reason::NoProfile)?;
         let known = if allowed.is_homed {
             ALL_AXES

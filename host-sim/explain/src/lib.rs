@@ -310,6 +310,7 @@ mod tests {
             Reason::NoStoredJob,
             Reason::NoRoom { words: 7 },
             Reason::NothingToResume,
+            Reason::BadSpeed { mm_s: -1.0 },
         ]
     }
 

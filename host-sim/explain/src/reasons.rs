@@ -3,7 +3,7 @@
 use super::{Entry, Family};
 
 /// In the order of codes.
-pub(super) const ENTRIES: [Entry; 38] = [
+pub(super) const ENTRIES: [Entry; 39] = [
     reason(
         0,
         "bad-frame",
@@ -345,6 +345,15 @@ pub(super) const ENTRIES: [Entry; 38] = [
         "A run goes on only with the job and the machine profile that it was begun with.",
         "Start the job from its beginning.",
         "`operate start part --resume` after a run that has finished.",
+    ),
+    reason(
+        38,
+        "bad-speed",
+        "The speed of a jog or probe move is not a finite one above 0.",
+        "The requested speed, mm/s.",
+        "Without a speed the move would never end; what is no number has no bound but the velocity of the profile, which a probe does not survive.",
+        "Give a speed in mm/s (`--speed 2`), or leave it out for the default.",
+        "`operate probe z-30 --speed nan`.",
     ),
 ];
 
