@@ -2,7 +2,7 @@
 
 use controller::{in_process::Board, spindle::output};
 use integration_tests::{HELLO, Host, dome, upload};
-use interp_core::{AxisLimits, FaultKind, State};
+use interp_core::{AxisLimits, FaultKind, RunStart, SpanParameter, State};
 use protocol::message::{
     Activity, AtSpeed, Configuration, DoorContact, InputLines, LinkTimeoutAction, MotionStatus, PWM_STEPS,
     PauseCause, Reason, Reply, Request, SpindleOrder, SpindleSettings, Status, Turning,
@@ -182,6 +182,59 @@ fn a_start_that_waits_can_be_taken_back() {
     assert_eq!(desk.outputs(), 0);
     desk.ticks(1000);
     assert_eq!((desk.outputs(), desk.status().state), (0, State::Ready));
+}
+
+/// Off by command while a start waits for it: the run does not begin without a spindle.
+#[test]
+fn a_spindle_switched_off_takes_back_the_start_that_waits_for_it() {
+    let mut desk = Desk::ready();
+    desk.ask(&Request::Start).unwrap();
+    desk.ticks(10);
+    let off = Request::Turn {
+        turning: Turning::Off,
+        rpm: 0,
+    };
+    desk.ask(&off).unwrap();
+    assert_eq!((desk.outputs(), desk.halts), (output::DRIVES, 1));
+    desk.ticks(2 * AT_SPEED);
+    assert_eq!((desk.status().state, desk.halts), (State::Ready, 1));
+    assert_eq!(desk.outputs(), output::DRIVES);
+}
+
+/// A start at a pass that was taken back, or whose spindle was too slow: the next one begins with the first pass.
+#[test]
+fn a_start_that_never_began_leaves_no_place_to_the_next() {
+    let at_pass = Request::StartAt(RunStart {
+        pass: 3,
+        path: SpanParameter::NONE,
+    });
+    let begins_at = |mut desk: Desk, start: &Request| {
+        desk.board.simulate(InputLines::AT_SPEED);
+        desk.ask(start).unwrap();
+        for _ in 0..20_000 {
+            desk.ticks(1);
+            if desk.status().state == State::Running {
+                return desk.status().pass;
+            }
+        }
+        panic!("{:?}", desk.status());
+    };
+    assert_eq!(begins_at(Desk::ready(), &at_pass), 3);
+
+    let mut desk = Desk::ready();
+    desk.ask(&at_pass).unwrap();
+    desk.ticks(10);
+    desk.ask(&Request::Stop).unwrap();
+    desk.ticks(2);
+    assert_eq!(begins_at(desk, &Request::Start), 0);
+
+    let mut desk = with_contact();
+    desk.ask(&at_pass).unwrap();
+    desk.ticks(AT_SPEED + 10);
+    assert_eq!(desk.status().state, State::Faulted);
+    desk.ask(&Request::Abort).unwrap();
+    desk.ticks(2);
+    assert_eq!(begins_at(desk, &Request::Start), 0);
 }
 
 #[test]
@@ -497,6 +550,40 @@ fn a_spindle_by_command_is_on_for_as_long_as_the_host_is_heard() {
     desk.ticks(3000);
     desk.ask(&Request::Resume).unwrap();
     assert_eq!(desk.outputs(), ON & !output::COOLANT, "for the rest of the run");
+    desk.ticks(AT_SPEED);
+    desk.ask(&Request::Abort).unwrap();
+    desk.ticks(3000);
+    assert_eq!(
+        (desk.status().state, desk.outputs()),
+        (State::Ready, output::DRIVES)
+    );
+    desk.ask(&Request::SetHome {
+        home_nm: [0, 0, 50_000_000],
+    })
+    .unwrap();
+    desk.ask(&Request::Start).unwrap();
+    assert_eq!(desk.outputs(), ON, "the next run has the job's");
+}
+
+/// Switched off while a start waits, the coolant stays off in that run, and the run keeps its spindle although the host is gone.
+#[test]
+fn a_coolant_switched_while_a_start_waits_is_that_of_its_run() {
+    let mut desk = Desk::ready();
+    desk.ask(&Request::Start).unwrap();
+    desk.ticks(10);
+    desk.ask(&Request::Coolant { on: false }).unwrap();
+    desk.ticks(AT_SPEED + 2000);
+    assert!(desk.status().state.is_under_way());
+    assert_eq!(desk.outputs(), ON & !output::COOLANT);
+    desk.ask(&Request::Abort).unwrap();
+    desk.ticks(3000);
+    desk.ask(&Request::Start).unwrap();
+    assert_eq!(desk.outputs(), ON);
+    desk.ask(&Request::Coolant { on: false }).unwrap();
+    desk.ask(&Request::Stop).unwrap();
+    desk.ticks(2);
+    desk.ask(&Request::Start).unwrap();
+    assert_eq!(desk.outputs(), ON, "the start that was taken back is over");
 }
 
 /// A start that waits for its spindle is over when an input forbids it: told to the host, with the spindle off.

@@ -434,7 +434,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         self.control.over = self.control.run.end_pass(interval);
         self.control.credit = 0;
         self.control.spent = false;
-        self.control.spindle.off();
+        self.control.spindle.end_run();
         self.halt(events);
     }
 

@@ -60,7 +60,7 @@ pub enum Order {
         /// Whether to switch it on.
         on: bool,
     },
-    /// Where the next run begins.
+    /// Where the next run begins; one after it, or after a start that was given up, begins with the first pass.
     BeginAt(RunStart),
     /// Configuration of the machine.
     Configure(Configuration),

@@ -45,13 +45,17 @@ pub(crate) enum Readiness {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Spindle {
     settings: Option<SpindleSettings>,
-    /// That of the job's runs.
+    /// Spindle and coolant of the job's runs.
     order: SpindleOrder,
-    /// As switched now, and the outputs for it, as in [`output`].
+    /// The operator's coolant for the rest of the present run, in place of the job's.
+    run_coolant: Option<bool>,
+    /// As switched now.
     now: SpindleOrder,
+    /// The outputs for `now`, as in [`output`].
     output: u32,
-    /// A start or resume waits, for so many periods.
+    /// A start or resume waits for the spindle.
     waits: bool,
+    /// Periods that the start or resume has waited.
     waited: u32,
     /// Switched on by a command outside a run.
     is_commanded: bool,
@@ -63,6 +67,7 @@ impl Spindle {
     pub(crate) const NEW: Self = Self {
         settings: None,
         order: SpindleOrder::OFF,
+        run_coolant: None,
         now: SpindleOrder::OFF,
         output: 0,
         waits: false,
@@ -79,7 +84,7 @@ impl Spindle {
     /// The next run has none.
     pub(crate) const fn clear(&mut self) {
         self.order = SpindleOrder::OFF;
-        self.off();
+        self.end_run();
     }
 
     #[inline]
@@ -101,6 +106,13 @@ impl Spindle {
         self.order.rpm
     }
 
+    /// A run, or a start that has waited, is over: off, and the next run has the job's coolant again.
+    pub(crate) const fn end_run(&mut self) {
+        self.run_coolant = None;
+        self.off();
+    }
+
+    /// Switches off; a run that is held keeps its order for the resume.
     pub(crate) const fn off(&mut self) {
         self.now = SpindleOrder::OFF;
         self.output = 0;
@@ -165,7 +177,7 @@ impl Spindle {
         Ok(())
     }
 
-    /// Switches the coolant at once; in a run also for the rest of it.
+    /// Switches the coolant at once; in a run, or while its start waits, also for the rest of the run.
     pub(crate) fn coolant(&mut self, on: bool, is_in_run: bool) -> Result<(), Reason> {
         let order = SpindleOrder {
             coolant: on,
@@ -174,7 +186,7 @@ impl Spindle {
         self.check(order)?;
         self.switch(order);
         if is_in_run {
-            self.order.coolant = on;
+            self.run_coolant = Some(on);
         } else {
             self.is_commanded = order != SpindleOrder::OFF;
         }
@@ -189,7 +201,11 @@ impl Spindle {
             .settings
             .map_or(AtSpeed::ByTime, |settings| settings.at_speed);
         if !self.waits {
-            let is_on = self.now == self.order && !self.is_commanded;
+            let order = SpindleOrder {
+                coolant: self.run_coolant.unwrap_or(self.order.coolant),
+                ..self.order
+            };
+            let is_on = self.now == order && !self.is_commanded;
             // By time it is at speed, if it is on.
             self.waited = if is_on && at_speed == AtSpeed::ByTime {
                 u32::MAX
@@ -197,7 +213,7 @@ impl Spindle {
                 0
             };
             self.is_commanded = false;
-            self.switch(self.order);
+            self.switch(order);
         }
         let needed = match (self.order.turning, self.settings) {
             (Turning::Off, _) | (_, None) => 0,

@@ -3,7 +3,7 @@
 use interp_core::{
     command::Command,
     fault::{Fault, FaultKind},
-    sample::State,
+    sample::{RunStart, State},
 };
 use protocol::message::{Clock, InputLines, PauseCause, Reason, Turning};
 
@@ -67,7 +67,8 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
     /// The end of a run that has not begun, to be reported with the next tick.
     pub(super) fn give_up_start(&mut self) {
         self.control.command = None;
-        self.control.spindle.off();
+        self.interpolator.begin_at(RunStart::FIRST);
+        self.control.spindle.end_run();
         self.control.safety.ending = true;
         self.control.safety.recheck();
     }
@@ -125,9 +126,14 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         }
     }
 
-    /// Switches the spindle outside a run.
+    /// Switches the spindle outside a run. Off takes back a start that waits for it, which would else begin without it.
     pub(super) fn turn(&mut self, turning: Turning, rpm: u32) -> Result<(), Reason> {
-        if turning != Turning::Off && rpm > 0 {
+        let is_off = turning == Turning::Off || rpm == 0;
+        if is_off && self.spins_up() {
+            self.give_up_start();
+            return Ok(());
+        }
+        if !is_off {
             self.may_switch_on()?;
         }
         self.control.spindle.turn(turning, rpm)?;
@@ -140,7 +146,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         if on {
             self.may_switch_on()?;
         }
-        let is_in_run = self.interpolator.state().is_under_way();
+        let is_in_run = self.spins_up() || self.interpolator.state().is_under_way();
         self.control.spindle.coolant(on, is_in_run)?;
         self.control.safety.heard(self.control.spindle.is_commanded());
         Ok(())
