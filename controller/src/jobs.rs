@@ -332,11 +332,7 @@ impl<F: NorFlash> JobStore<F> {
             return Err(StorageError);
         }
         self.set_word(place.tail(), WHOLE)?;
-        let is_before = |other: &JobPlace, its: &Name| *other != place && *its == name;
-        while let Some(before) = self.first(is_before) {
-            self.delete_at(&before)?;
-        }
-        Ok(())
+        self.delete_others(&place, &name)
     }
 
     /// Keeps a job no longer. Returns whether there was one.
@@ -344,12 +340,22 @@ impl<F: NorFlash> JobStore<F> {
     /// # Errors
     /// The flash cannot be written.
     pub fn delete(&mut self, name: &str) -> Result<bool, StorageError> {
-        let mut found = false;
-        while let Some(place) = self.find(Some(name)) {
-            self.delete_at(&place)?;
-            found = true;
+        let Some(newest) = self.find(Some(name)) else {
+            return Ok(false);
+        };
+        // The newest one last: cut short, this must not bring back one that it has replaced.
+        self.delete_others(&newest, &padded(name))?;
+        self.delete_at(&newest)?;
+        Ok(true)
+    }
+
+    /// Keeps no other job of this name than the one at `place`.
+    fn delete_others(&mut self, place: &JobPlace, name: &Name) -> Result<(), StorageError> {
+        let is_other = |other: &JobPlace, its: &Name| other != place && its == name;
+        while let Some(other) = self.first(is_other) {
+            self.delete_at(&other)?;
         }
-        Ok(found)
+        Ok(())
     }
 
     fn delete_at(&mut self, place: &JobPlace) -> Result<(), StorageError> {

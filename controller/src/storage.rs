@@ -282,11 +282,14 @@ impl<F: NorFlash> Storage<F> {
     /// Finds the newest record anew: one was written that was prepared.
     pub fn look_again(&mut self) {
         let [first, second] = [0, 1].map(|sector| self.look(sector, BLANK_SLOTS));
+        let before = self.active;
         self.active = if second.sequence > first.sequence {
             second
         } else {
             first
         };
+        // A new chip's spare has no record that says so.
+        self.active.has_spare |= before.has_spare && before.sector == self.active.sector;
     }
 
     /// Writes a record into the next slots, and reads it back.

@@ -227,3 +227,38 @@ fn a_power_cut_at_any_operation_leaves_whole_jobs() {
     }
     assert!(cuts > 500, "{cuts}");
 }
+
+/// Two jobs of one name are kept where the power was cut between the end of the later one and the deletion of the earlier one: a second cut, in a deletion of both, never
+/// leaves the earlier one alone.
+#[test]
+fn a_deletion_that_is_cut_short_brings_no_replaced_job_back() {
+    let [old, new] = [words(1, 20), words(2, 20)];
+    let mut was_cut_between = false;
+    for left in 0.. {
+        let mut store = JobStore::open(RamFlash::<SECTOR>::new());
+        keep(&mut store, "a", &old).unwrap();
+        let mut store = JobStore::open(Failing {
+            flash: store.into_flash(),
+            left,
+            bits: 0,
+        });
+        if keep(&mut store, "a", &new).is_ok() {
+            break;
+        }
+        let flash = store.into_flash().flash;
+        if kept(&mut JobStore::open(flash.clone())).len() < 2 {
+            continue;
+        }
+        was_cut_between = true;
+        for (left, bits) in [(0, 0), (0, 0x0f), (1, 0), (1, 0x0f)] {
+            let flash = flash.clone();
+            let mut store = JobStore::open(Failing { flash, left, bits });
+            assert_eq!(store.delete("a"), Err(StorageError));
+            let mut store = JobStore::open(store.into_flash().flash);
+            for (_, words) in kept(&mut store).iter().rev().take(1) {
+                assert_eq!(*words, new, "after {left} words and bits {bits:#x}");
+            }
+        }
+    }
+    assert!(was_cut_between);
+}

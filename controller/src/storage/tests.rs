@@ -100,6 +100,36 @@ fn without_a_power_up_there_is_room_for_two_sectors() {
     assert_eq!(storage.newest(Kind::Profile).unwrap().bytes(), [99]);
 }
 
+/// The spare of a new chip is known without a record of it, also after a prepared record was written.
+#[test]
+fn a_prepared_record_on_a_new_chip_leaves_room_for_two_sectors() {
+    let mut storage = Storage::open(RamFlash::<SECTOR>::new());
+    storage.keep(Kind::Profile, &[1]).unwrap();
+    let prepared = storage.prepare(Kind::Journal, &[2]).unwrap();
+    storage.flash.write(prepared.offset, &prepared.bytes).unwrap();
+    storage.look_again();
+    assert_eq!(storage.newest(Kind::Journal).unwrap().bytes(), [2]);
+    // Three slots are taken: the prepared record leaves one blank.
+    for record in 3..2 * SLOTS as u8 {
+        storage.keep(Kind::Journal, &[record]).unwrap();
+    }
+    assert_eq!(storage.keep(Kind::Journal, &[99]), Err(StorageError));
+    assert_eq!(storage.newest(Kind::Profile).unwrap().bytes(), [1]);
+    // Prepared in the spare: that is the active sector then, and has none.
+    let mut storage = Storage::open(RamFlash::<SECTOR>::new());
+    for record in 0..SLOTS as u8 {
+        storage.keep(Kind::Journal, &[record]).unwrap();
+    }
+    let prepared = storage.prepare(Kind::Journal, &[77]).unwrap();
+    storage.flash.write(prepared.offset, &prepared.bytes).unwrap();
+    storage.look_again();
+    assert_eq!(storage.newest(Kind::Journal).unwrap().bytes(), [77]);
+    for record in 2..SLOTS as u8 {
+        storage.keep(Kind::Journal, &[record]).unwrap();
+    }
+    assert_eq!(storage.keep(Kind::Journal, &[99]), Err(StorageError));
+}
+
 #[test]
 fn what_else_was_in_the_sectors_is_erased() {
     let mut flash = RamFlash::<SECTOR>::new();
