@@ -291,7 +291,7 @@ fn formats_units_and_placements_agree() {
 fn worst_nm(job: &Job, most: u64) -> (f64, f64, u64, Option<String>) {
     let oracle = Oracle::new(job).unwrap();
     let prepared = prepare(job).unwrap();
-    let mut survey = Survey::new(&oracle, None, None);
+    let mut survey = Survey::new(&oracle, None);
     let mut machine = Machine::load(&prepared).unwrap();
     let (mut samples, mut last, mut cut) = (0, None, false);
     let result = machine.run(|sample| {
@@ -299,10 +299,16 @@ fn worst_nm(job: &Job, most: u64) -> (f64, f64, u64, Option<String>) {
         last = Some(sample.pass);
         samples += 1;
         cut = samples >= most && begins;
-        survey.add(&inspect::plain(&prepared, sample)).is_ok() && !cut
+        survey
+            .add(&inspect::plain(&prepared, sample), &mut |_, _| ())
+            .is_ok()
+            && !cut
     });
     let fault = result.as_ref().err().map(|fault| format!("{fault:?}"));
-    let report = survey.finish(result.is_ok() && !cut).unwrap().report;
+    let report = survey
+        .finish(result.is_ok() && !cut, &mut |_, _| ())
+        .unwrap()
+        .report;
     (
         report.position_nm.max.abs(),
         report.ripple_pct.max.abs(),

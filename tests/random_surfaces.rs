@@ -28,7 +28,7 @@ struct Ran {
 fn run(job: &Job, most: u64) -> Ran {
     let oracle = Oracle::new(job).unwrap();
     let prepared = prepare(job).unwrap();
-    let mut survey = Survey::new(&oracle, None, None);
+    let mut survey = Survey::new(&oracle, None);
     let mut machine = Machine::load(&prepared).unwrap();
     let mut samples = 0;
     let (mut first, mut last, mut cut) = (None, None, false);
@@ -41,12 +41,18 @@ fn run(job: &Job, most: u64) -> Ran {
         last = Some(here);
         samples += 1;
         cut = samples >= most && begins;
-        survey.add(&inspect::plain(&prepared, sample)).is_ok() && !cut
+        survey
+            .add(&inspect::plain(&prepared, sample), &mut |_, _| ())
+            .is_ok()
+            && !cut
     });
     let (pass, path, side) = machine.place();
     let across = last.is_some_and(|(last, _)| last != pass) && job.pattern == Pattern::Zig;
     let neighbour = if across { first } else { last }.map(|(_, parameters)| parameters);
-    let report = survey.finish(result.is_ok() && !cut).unwrap().report;
+    let report = survey
+        .finish(result.is_ok() && !cut, &mut |_, _| ())
+        .unwrap()
+        .report;
     Ran {
         fault: result.err(),
         position_nm: report.position_nm.max,

@@ -26,12 +26,12 @@ fn report(name: &str, folder: &Path, remarks: &Remarks) -> (PathBuf, SurveyResul
     let oracle = Oracle::new(&job).unwrap();
     let mut sketch = Sketch::new(&job, oracle.schedule().unwrap().len());
     let mut draw = |sample: &PassSample, checked: &SampleCheck| sketch.add(sample, checked);
-    let mut survey = Survey::new(&oracle, None, Some(&mut draw));
+    let mut survey = Survey::new(&oracle, None);
     Machine::load(&prepared)
         .unwrap()
-        .run(|sample| survey.add(&inspect::plain(&prepared, sample)).is_ok())
+        .run(|sample| survey.add(&inspect::plain(&prepared, sample), &mut draw).is_ok())
         .unwrap();
-    let findings = survey.finish(true).unwrap();
+    let findings = survey.finish(true, &mut draw).unwrap();
     let page = sketch.write(folder, Path::new(name), &findings, remarks).unwrap();
     (page.canonicalize().unwrap(), findings)
 }

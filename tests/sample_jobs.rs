@@ -101,12 +101,16 @@ mod feed_ripple {
             job.scallop_mm = if feed_mm_min < 100.0 { 1.0 } else { 0.1 };
             let oracle = Oracle::new(&job).unwrap();
             let prepared = prepare(&job).unwrap();
-            let mut survey = Survey::new(&oracle, None, None);
+            let mut survey = Survey::new(&oracle, None);
             let mut machine = Machine::load(&prepared).unwrap();
             machine
-                .run(|sample| survey.add(&inspect::plain(&prepared, sample)).is_ok())
+                .run(|sample| {
+                    survey
+                        .add(&inspect::plain(&prepared, sample), &mut |_, _| ())
+                        .is_ok()
+                })
                 .unwrap();
-            let findings = survey.finish(true).unwrap();
+            let findings = survey.finish(true, &mut |_, _| ()).unwrap();
             let ripple = findings.report.ripple_pct.max;
             assert!(
                 findings.samples > 10_000 && ripple <= 0.001,

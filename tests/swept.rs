@@ -29,12 +29,12 @@ pub(crate) fn follow(job: &Job) -> Followed {
     let mut keep = |emitted: &PassSample, _: &SampleCheck| {
         track.add(emitted, job.along);
     };
-    let mut survey = Survey::new(&oracle, None, Some(&mut keep));
+    let mut survey = Survey::new(&oracle, None);
     Machine::load(&prepared)
         .unwrap()
-        .run(|sample| survey.add(&inspect::plain(&prepared, sample)).is_ok())
+        .run(|sample| survey.add(&inspect::plain(&prepared, sample), &mut keep).is_ok())
         .unwrap();
-    let findings = survey.finish(true).unwrap();
+    let findings = survey.finish(true, &mut keep).unwrap();
     // With axis limits the path has fewer samples than the run: no links, and none closer together than the spacing.
     // The tool stands while a curved pass is made, or the next pass of a region is sought: those samples are left out, too.
     if prepared.header.axes.is_none() && !job.spacing.is_constant() && job.region.is_none() {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use glam::DVec3;
-use job::{Job, Spacing};
+use job::{Job, Spacing, units};
 use machine::prepare::{Prepared, prepare};
 use oracle::{Oracle, PassSample};
 use verify::EmittedSample;
@@ -68,7 +68,7 @@ pub fn path_and_crests(
     spacing_mm: f64,
 ) -> Result<(PathFigures, SweptResult), InspectError> {
     let oracle = Oracle::new(job)?;
-    let mut track = ToolPath::with_spacing(spacing_mm * 1e6, job.scallop_mm);
+    let mut track = ToolPath::with_spacing(spacing_mm * units::NM_PER_MM, job.scallop_mm);
     // Held back until the next sample shows whether it is the last of its pass.
     let mut held: Option<PassSample> = None;
     let path = follow(job, prepared, &oracle, &mut |sample| {
@@ -113,7 +113,7 @@ fn follow(
         let (path, _) = oracle.swapped(u, v);
         let ends = passes.entry(sample.pass).or_insert([path; 2]);
         *ends = [ends[0], path];
-        let contact = DVec3::from(sample.cc_nm.map(f64::from)) * 1e-6;
+        let contact = DVec3::from(units::position_mm(sample.cc_nm));
         if let Some((pass, before)) = last
             && pass == sample.pass
         {

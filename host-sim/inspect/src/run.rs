@@ -6,7 +6,7 @@ use interp_core::{Fault, SpanParameter};
 use job::{Job, JobError};
 use machine::Machine;
 use machine::prepare::Prepared;
-use oracle::Oracle;
+use oracle::{Oracle, PassSample, SampleCheck};
 use protocol::digest::Digest;
 use verify::survey::{SampleObserver, Survey, SurveyResult};
 use verify::swept::Progress;
@@ -137,25 +137,27 @@ pub fn time_run(job: &Job, prepared: &Prepared, progress: &dyn Progress) -> Resu
 ///
 /// # Errors
 /// The core refuses the job, the oracle has no result for it, or the trace cannot be written.
-pub fn survey_run<'a>(
+pub fn survey_run(
     job: &Job,
     prepared: &Prepared,
     samples: u64,
     trace: Option<Trace>,
-    each: Option<&'a mut SampleObserver<'a>>,
+    each: Option<&mut SampleObserver<'_>>,
     progress: &dyn Progress,
 ) -> Result<SurveyResult, InspectError> {
     let oracle = oracle(job)?;
-    let mut survey = Survey::new(&oracle, trace, each);
+    let mut survey = Survey::new(&oracle, trace);
+    let mut ignore = |_: &PassSample, _: &SampleCheck| ();
+    let each: &mut SampleObserver<'_> = each.unwrap_or(&mut ignore);
     progress.begin("measuring", samples);
     let mut written = Ok(());
     let ran = machine(job, prepared)?.run(|sample| {
-        written = survey.add(&plain(prepared, sample));
+        written = survey.add(&plain(prepared, sample), each);
         if u64::from(sample.tick) % PROGRESS_SAMPLES == PROGRESS_SAMPLES - 1 {
             progress.done(PROGRESS_SAMPLES);
         }
         written.is_ok()
     });
     written?;
-    Ok(survey.finish(ran.is_ok())?)
+    Ok(survey.finish(ran.is_ok(), each)?)
 }

@@ -1,14 +1,13 @@
 //! The verification of a job: every sample, the swept ball, travel, limits, the optimum.
 
-use std::cell::RefCell;
 use std::collections::BTreeMap;
 
 use glam::DVec3;
-use interp_core::State;
-use job::Job;
+use interp_core::{Sample, State};
+use job::{Job, units};
 use machine::prepare::Prepared;
 use machine::travel;
-use oracle::{AccuracyBounds, PassSample, SampleCheck};
+use oracle::{AccuracyBounds, PassSample};
 use verify::EmittedSample;
 use verify::motion::{
     JobTimes, OptimumTimes, PassEnd, PeakMeter, Peaks, RunPass, TimeMeter, limits, optimum_times, times,
@@ -94,7 +93,7 @@ pub struct RunMeasurements {
     pub times: JobTimes,
     /// Passes and the whole job against the optimum; empty if not requested.
     pub optimum: OptimumTimes,
-    /// Passes of constant scallop height beside straight ones; `None` for a job of straight passes.
+    /// Passes of constant scallop height beside straight ones; `None` for a job of straight passes, and where a warning says why.
     pub curved: Option<CurvedFigures>,
 }
 
@@ -123,15 +122,22 @@ pub struct Requirements<'a> {
 ///
 /// # Errors
 /// The core refuses the job, or the oracle has no result for it.
-pub fn verify_run<'a>(
+pub fn verify_run(
     job: &Job,
     prepared: &Prepared,
     timed: &TimedRun,
-    each: Option<&'a mut SampleObserver<'a>>,
+    each: Option<&mut SampleObserver<'_>>,
     requirements: &Requirements<'_>,
     progress: &dyn Progress,
 ) -> Result<Verification, InspectError> {
-    let measured = measure(job, prepared, timed, each, requirements, progress)?;
+    let mut measured = measure(job, prepared, timed, each, requirements, progress)?;
+    let without_curved = match curved_figures(job, prepared) {
+        Ok(curved) => {
+            measured.curved = curved;
+            None
+        }
+        Err(error) => Some(format!("the passes are not compared with straight ones: {error}")),
+    };
     // Curved passes are checked by the scallop height alone; those of a region line by line, because a line more or less may pass by a vertex or meet it.
     let scanned = match job.spacing.is_constant() || job.region.is_some() {
         true => None,
@@ -141,6 +147,7 @@ pub fn verify_run<'a>(
     let own = |warning: &&String| !failures.contains(warning);
     let mut warnings: Vec<String> = measured.swept.warnings.iter().filter(own).cloned().collect();
     warnings.extend(times::warning(&measured.times));
+    warnings.extend(without_curved);
     Ok(Verification {
         measured,
         scanned,
@@ -149,58 +156,53 @@ pub fn verify_run<'a>(
     })
 }
 
-/// Runs the core again and measures every sample, then the swept ball against the surface.
-fn measure<'a>(
-    job: &Job,
-    prepared: &Prepared,
-    timed: &TimedRun,
-    mut each: Option<&'a mut SampleObserver<'a>>,
-    requirements: &Requirements<'_>,
-    progress: &dyn Progress,
-) -> Result<RunMeasurements, InspectError> {
-    let oracle = oracle(job)?;
-    // With limits the feed is low at the ends of passes: on straight parts samples closer than half the full step of a period are not stored.
-    let spacing_nm = if job.machine.has_limits() {
-        0.5e6 * job.feed_mm_s() * job.machine.period_s()
-    } else {
-        0.0
-    };
-    let track = RefCell::new(ToolPath::with_spacing(spacing_nm, job.scallop_mm));
-    let slow = RefCell::new(BTreeMap::<u32, Vec<(u64, f64)>>::new());
-    let mut turn = TurnEnds::new(&oracle);
-    let axes = RefCell::new(AxesUse::new(job));
-    let mut contact = ContactSide::default();
-    let mut keep = |emitted: &PassSample, checked: &SampleCheck| {
-        if !track.borrow_mut().add(emitted, job.along) {
-            let (path, _) = oracle.swapped(emitted.u, emitted.v);
-            slow.borrow_mut()
-                .entry(emitted.pass)
-                .or_default()
-                .push((emitted.tick, path));
+/// The meters of a run, in the order of its samples.
+struct Meters<'a> {
+    job: &'a Job,
+    oracle: &'a oracle::Oracle,
+    track: ToolPath,
+    turn: TurnEnds<'a>,
+    /// By pass, ticks and path parameters of the samples that the tool path leaves out.
+    slow: BTreeMap<u32, Vec<(u64, f64)>>,
+    running: BTreeMap<u32, PassSamples>,
+    last_pass: Option<u32>,
+    axes: AxesUse,
+    contact: ContactSide,
+    motion: Motion,
+    time: TimeMeter,
+}
+
+impl<'a> Meters<'a> {
+    fn new(job: &'a Job, oracle: &'a oracle::Oracle) -> Self {
+        // With limits the feed is low at the ends of passes: on straight parts samples closer than half the full step of a period are not stored.
+        let spacing_nm = if job.machine.has_limits() {
+            0.5 * units::NM_PER_MM * job.feed_mm_s() * job.machine.period_s()
+        } else {
+            0.0
+        };
+        let least = |limits: job::AxisLimits| limits.jerk_mm_s3.into_iter().fold(f64::INFINITY, f64::min);
+        let jerk_mm_s3 = job.machine.limits.map(least);
+        Self {
+            job,
+            oracle,
+            track: ToolPath::with_spacing(spacing_nm, job.scallop_mm),
+            turn: TurnEnds::new(oracle),
+            slow: BTreeMap::new(),
+            running: BTreeMap::new(),
+            last_pass: None,
+            axes: AxesUse::new(job),
+            contact: ContactSide::default(),
+            motion: Motion::default(),
+            time: TimeMeter::new(job.machine.period_s(), job.feed_mm_s(), jerk_mm_s3),
         }
-        contact.add(contact_place(emitted), millimetres(emitted.cl_nm));
-        axes.borrow_mut().on_pass(emitted);
-        if let Some(each) = &mut each {
-            each(emitted, checked);
-        }
-    };
-    let mut survey = Survey::new(&oracle, None, Some(&mut keep));
-    let mut written = Ok(());
-    let mut last_pass = None;
-    let mut running = BTreeMap::<u32, PassSamples>::new();
-    let mut motion = Motion::default();
-    let jerk_mm_s3 = job
-        .machine
-        .limits
-        .map(|limits| limits.jerk_mm_s3.into_iter().fold(f64::INFINITY, f64::min));
-    let mut time = TimeMeter::new(job.machine.period_s(), job.feed_mm_s(), jerk_mm_s3);
-    progress.begin("measuring", timed.samples);
-    let ran = machine(job, prepared)?.run(|sample| {
-        axes.borrow_mut().emitted(sample.tick, sample.cl_nm);
-        let emitted = plain(prepared, sample);
+    }
+
+    /// A sample as emitted by the machine, before the survey has it.
+    fn on_sample(&mut self, sample: &Sample, emitted: &EmittedSample) {
+        self.axes.emitted(sample.tick, sample.cl_nm);
         if let (State::Running, Some([u, v])) = (sample.state, emitted.parameters) {
-            let (path, _) = oracle.swapped(u, v);
-            let pass = running.entry(sample.pass).or_insert(PassSamples {
+            let (path, _) = self.oracle.swapped(u, v);
+            let pass = self.running.entry(sample.pass).or_insert(PassSamples {
                 count: 0,
                 path: [path; 2],
                 slow: Vec::new(),
@@ -208,52 +210,111 @@ fn measure<'a>(
             pass.count += 1;
             pass.path[1] = path;
         }
-        time.add(&emitted);
+        self.time.add(emitted);
         // Without limits the passes follow each other without links.
-        let jumps = !job.machine.has_limits() && last_pass.replace(sample.pass) != Some(sample.pass);
-        motion.add(sample.cl_nm, emitted.parameters.is_some(), jumps);
-        turn.enter(&emitted, &track);
-        written = survey.add(&emitted);
-        turn.leave(&emitted, &track);
+        let jumps =
+            self.last_pass.replace(sample.pass) != Some(sample.pass) && !self.job.machine.has_limits();
+        self.motion.add(sample.cl_nm, emitted.parameters.is_some(), jumps);
+        self.turn.enter(emitted, &mut self.track);
+    }
+
+    /// A sample on a pass, once the survey has its next one.
+    fn on_pass(&mut self, sample: &PassSample) {
+        if !self.track.add(sample, self.job.along) {
+            let (path, _) = self.oracle.swapped(sample.u, sample.v);
+            self.slow
+                .entry(sample.pass)
+                .or_default()
+                .push((sample.tick, path));
+        }
+        let centre_mm = units::position_mm(sample.cl_nm).into();
+        self.contact.add(contact_place(sample), centre_mm);
+        self.axes.on_pass(sample);
+    }
+
+    /// The same sample as [`Self::on_sample`], after the survey has it.
+    fn after_sample(&mut self, emitted: &EmittedSample) {
+        self.turn.leave(emitted, &mut self.track);
+    }
+
+    /// The samples of each pass, with those that the tool path leaves out.
+    fn passes(&mut self) -> BTreeMap<u32, PassSamples> {
+        let mut passes = std::mem::take(&mut self.running);
+        for (pass, slow) in std::mem::take(&mut self.slow) {
+            if let Some(samples) = passes.get_mut(&pass) {
+                samples.slow = slow;
+            }
+        }
+        passes
+    }
+}
+
+/// Runs the core again and measures every sample, then the swept ball against the surface.
+fn measure(
+    job: &Job,
+    prepared: &Prepared,
+    timed: &TimedRun,
+    mut each: Option<&mut SampleObserver<'_>>,
+    requirements: &Requirements<'_>,
+    progress: &dyn Progress,
+) -> Result<RunMeasurements, InspectError> {
+    let oracle = oracle(job)?;
+    let mut meters = Meters::new(job, &oracle);
+    let mut survey = Survey::new(&oracle, None);
+    let mut written = Ok(());
+    progress.begin("measuring", timed.samples);
+    let ran = machine(job, prepared)?.run(|sample| {
+        let emitted = plain(prepared, sample);
+        meters.on_sample(sample, &emitted);
+        written = survey.add(&emitted, &mut |sample, checked| {
+            meters.on_pass(sample);
+            if let Some(each) = &mut each {
+                each(sample, checked);
+            }
+        });
+        meters.after_sample(&emitted);
         if u64::from(sample.tick) % PROGRESS_SAMPLES == PROGRESS_SAMPLES - 1 {
             progress.done(PROGRESS_SAMPLES);
         }
         written.is_ok()
     });
     written?;
-    let times = time.finish();
-    let findings = survey.finish(ran.is_ok())?;
-    let track = track.into_inner();
-    for (pass, slow) in slow.into_inner() {
-        if let Some(samples) = running.get_mut(&pass) {
-            samples.slow = slow;
+    let findings = survey.finish(ran.is_ok(), &mut |sample, checked| {
+        meters.on_pass(sample);
+        if let Some(each) = &mut each {
+            each(sample, checked);
         }
-    }
+    })?;
+    let passes = meters.passes();
+    let Meters {
+        track,
+        axes,
+        contact,
+        mut motion,
+        time,
+        ..
+    } = meters;
+    let times = time.finish();
     let swept = swept::measure(job, &oracle, &track, ran.is_ok(), &requirements.swept, progress);
     let links_mm = motion.links();
     motion.join(times.links.iter().map(|link| link.turn));
     let reach = reach::measure(job, &oracle, &motion, &contact, progress);
     let optimum = if requirements.with_optimum && !job.spacing.is_constant() {
         progress.begin("the optimum", 1);
-        optimum_times(job, &oracle, &run_passes(&oracle, &track, &running), &times)
+        optimum_times(job, &oracle, &run_passes(&oracle, &track, &passes), &times)
     } else {
         OptimumTimes::default()
     };
-    let curved = curved_figures(job, prepared).ok().flatten();
     Ok(RunMeasurements {
         findings,
         swept,
         reach,
         links_mm,
-        axes: axes.into_inner().finish(),
+        axes: axes.finish(),
         times,
         optimum,
-        curved,
+        curved: None,
     })
-}
-
-fn millimetres(nm: [i32; 3]) -> DVec3 {
-    DVec3::from(nm.map(f64::from)) * 1e-6
 }
 
 /// The contact of a sample.
@@ -262,7 +323,7 @@ fn contact_place(sample: &PassSample) -> ContactPlace {
         sample: usize::try_from(sample.tick).unwrap_or(usize::MAX),
         pass: sample.pass,
         uv: [sample.u, sample.v],
-        place_mm: millimetres(sample.cc_nm),
+        place_mm: units::position_mm(sample.cc_nm).into(),
     }
 }
 
@@ -285,22 +346,22 @@ impl<'a> TurnEnds<'a> {
     }
 
     /// A pass begins with this sample: the one before it is in the turn.
-    fn enter(&self, sample: &EmittedSample, track: &RefCell<ToolPath>) {
+    fn enter(&self, sample: &EmittedSample, track: &mut ToolPath) {
         if let (true, Some(before), Some(at)) = (self.oracle.overruns, &self.last, sample.parameters)
             && before.parameters.is_none()
             && self.boundary(at) != self.oracle.swapped(at[0], at[1]).0
         {
-            track.borrow_mut().enter(before.cl_nm, self.boundary(at));
+            track.enter(before.cl_nm, self.boundary(at));
         }
     }
 
     /// A pass has ended before this sample, which is in the turn.
-    fn leave(&mut self, sample: &EmittedSample, track: &RefCell<ToolPath>) {
+    fn leave(&mut self, sample: &EmittedSample, track: &mut ToolPath) {
         if let (true, Some(before)) = (self.oracle.overruns, &self.last)
             && let (Some(at), None) = (before.parameters, sample.parameters)
             && self.boundary(at) != self.oracle.swapped(at[0], at[1]).0
         {
-            track.borrow_mut().leave(sample.cl_nm, self.boundary(at));
+            track.leave(sample.cl_nm, self.boundary(at));
         }
         self.last = Some(*sample);
     }
@@ -406,6 +467,28 @@ mod tests {
             let whole = optimum.whole_ratio.unwrap();
             assert!((1.0..1.3).contains(&whole), "{whole}");
         }
+    }
+
+    /// The comparison of curved passes with straight ones runs the job once more: where a fault ends that run, a warning says so.
+    #[test]
+    fn a_warning_says_why_curved_passes_are_not_compared() {
+        // 10 mm per period on circles around the pole.
+        let cap = include_str!("../../../jobs/sphere_cap.toml");
+        let mut job = job_file::parse("job.toml", cap).unwrap();
+        job.spacing = job::Spacing::Constant(job::Start::Edge);
+        (job.along, job.machine.limits) = (job::Along::V, None);
+        (job.scallop_mm, job.feed_mm_min) = (0.5, job::FEED_MAX_MM_MIN);
+        let prepared = prepare(&job).unwrap();
+        let timed = time_run(&job, &prepared, &()).unwrap();
+        assert!(timed.fault.is_some());
+        let found = verify_run(&job, &prepared, &timed, None, &Requirements::default(), &()).unwrap();
+        assert_eq!(found.measured.curved, None);
+        let why = "the passes are not compared with straight ones: ";
+        assert!(
+            found.warnings.iter().any(|warning| warning.starts_with(why)),
+            "{:?}",
+            found.warnings
+        );
     }
 
     /// A job that names one limit runs within the defaults of the others, and is judged by them: of velocity, acceleration and jerk each

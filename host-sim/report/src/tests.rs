@@ -39,12 +39,12 @@ pub(super) fn run(text: &str) -> (Job, Sketch, SurveyResult) {
     let passes = oracle.schedule().unwrap().len();
     let mut sketch = Sketch::new(&job, passes);
     let mut draw = |sample: &PassSample, checked: &SampleCheck| sketch.add(sample, checked);
-    let mut survey = Survey::new(&oracle, None, Some(&mut draw));
+    let mut survey = Survey::new(&oracle, None);
     Machine::load(&prepared)
         .unwrap()
-        .run(|sample| survey.add(&inspect::plain(&prepared, sample)).is_ok())
+        .run(|sample| survey.add(&inspect::plain(&prepared, sample), &mut draw).is_ok())
         .unwrap();
-    let findings = survey.finish(true).unwrap();
+    let findings = survey.finish(true, &mut draw).unwrap();
     (job, sketch, findings)
 }
 

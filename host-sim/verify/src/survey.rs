@@ -4,9 +4,8 @@ use crate::EmittedSample;
 use crate::speeds::{SpeedFigures, SpeedRecorder};
 use crate::trace::Trace;
 use glam::DVec3;
+use job::units;
 use oracle::{AccuracyReport, Oracle, PassSample, SampleCheck, Verifier};
-
-const MM_PER_NM: f64 = 1e-6;
 
 /// Result of the survey of a run.
 #[derive(Clone, Debug)]
@@ -34,10 +33,9 @@ struct PendingSample {
 pub type SampleObserver<'a> = dyn FnMut(&PassSample, &SampleCheck) + 'a;
 
 /// The survey of one run.
-pub struct Survey<'a> {
+pub struct Survey {
     verifier: Verifier,
     trace: Option<Trace>,
-    each: Option<&'a mut SampleObserver<'a>>,
     pending: Option<PendingSample>,
     samples: u64,
     oracle: Oracle,
@@ -47,15 +45,13 @@ pub struct Survey<'a> {
     interval_min: f64,
 }
 
-impl<'a> Survey<'a> {
-    /// A survey of a run of this job. It writes the trace, if there is one, and calls `each` for every sample on a pass, with
-    /// its errors.
+impl Survey {
+    /// A survey of a run of this job. It writes the trace, if there is one.
     #[must_use]
-    pub fn new(oracle: &Oracle, trace: Option<Trace>, each: Option<&'a mut SampleObserver<'a>>) -> Self {
+    pub fn new(oracle: &Oracle, trace: Option<Trace>) -> Self {
         Self {
             verifier: Verifier::new(oracle),
             trace,
-            each,
             pending: None,
             samples: 0,
             oracle: oracle.clone(),
@@ -66,11 +62,11 @@ impl<'a> Survey<'a> {
         }
     }
 
-    /// Adds the next sample of the run.
+    /// Adds the next sample of the run. `each` is called for the sample on a pass that this one shows to be complete, with its errors.
     ///
     /// # Errors
     /// The trace cannot be written.
-    pub fn add(&mut self, sample: &EmittedSample) -> std::io::Result<()> {
+    pub fn add(&mut self, sample: &EmittedSample, each: &mut SampleObserver<'_>) -> std::io::Result<()> {
         self.samples += 1;
         if let Some(trace) = &mut self.trace {
             trace.write(sample)?;
@@ -84,7 +80,7 @@ impl<'a> Survey<'a> {
         let first = match self.pending {
             Some(before) => {
                 let over = before.sample.pass != sample.pass;
-                self.emit(before, over);
+                self.emit(before, over, each);
                 over
             }
             None => true,
@@ -97,7 +93,12 @@ impl<'a> Survey<'a> {
         Ok(())
     }
 
-    fn emit(&mut self, PendingSample { sample, first }: PendingSample, last: bool) {
+    fn emit(
+        &mut self,
+        PendingSample { sample, first }: PendingSample,
+        last: bool,
+        each: &mut SampleObserver<'_>,
+    ) {
         let Some(emitted) = sample.emitted(first, last) else {
             return;
         };
@@ -105,7 +106,7 @@ impl<'a> Survey<'a> {
         self.speeds.add(
             &emitted,
             checked.arc_mm,
-            DVec3::from(sample.cl_nm.map(f64::from)) * MM_PER_NM,
+            DVec3::from(units::position_mm(sample.cl_nm)),
         );
         if first {
             // A point without a normal is reported by the verifier.
@@ -113,18 +114,16 @@ impl<'a> Survey<'a> {
             self.ratio_step = self.ratio_step.max(self.oracle.ratio_step(side).unwrap_or(0.0));
             self.feed_mm_s = self.feed_mm_s.max(emitted.feed_mm_s);
         }
-        if let Some(each) = &mut self.each {
-            each(&emitted, &checked);
-        }
+        each(&emitted, &checked);
     }
 
-    /// The result, after the run's last sample; `complete`: the run reached its end.
+    /// The result, after the run's last sample; `complete`: the run reached its end. `each` is called for the last sample on a pass.
     ///
     /// # Errors
     /// The trace cannot be written.
-    pub fn finish(mut self, complete: bool) -> std::io::Result<SurveyResult> {
+    pub fn finish(mut self, complete: bool, each: &mut SampleObserver<'_>) -> std::io::Result<SurveyResult> {
         if let Some(pending) = self.pending {
-            self.emit(pending, complete);
+            self.emit(pending, complete, each);
         }
         if let Some(trace) = self.trace {
             trace.finish()?;
