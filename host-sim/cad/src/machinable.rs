@@ -12,7 +12,7 @@ use super::trim::{Polygon, trim};
 use super::{CadError, Face, Outline, Surface, outline};
 use job::{FaceParameters, NurbsSpec, SurfaceSpec};
 use job_file::{TOLERANCE_DEFAULT_MM, TOLERANCE_MAX_MM};
-use machine::prepare::{patch_count, streamed_patch_count};
+use patches::records::{patch_count, streamed_patch_count};
 
 /// Highest degree of the surface of a job.
 const DEGREE_EXACT: usize = 3;

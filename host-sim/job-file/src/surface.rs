@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use job::{JobError, NurbsSpec, SurfaceSpec};
+use patches::records::PATCHES_MAX;
 
 use crate::file::{Face, FaceReader, FaceSurface};
 use crate::section::{Section, Value};
@@ -172,9 +173,6 @@ fn nurbs(section: &Section<'_>) -> Result<SurfaceSpec, JobError> {
         rational,
     }))
 }
-
-/// Patches of a job at most: a file has room for more, which would take minutes to place.
-const PATCHES_MAX: usize = 65_536;
 
 /// The patches between the knots.
 fn few_enough(section: &Section<'_>, degree: [usize; 2], knots: [&[f64]; 2]) -> Result<(), JobError> {

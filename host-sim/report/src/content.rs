@@ -7,7 +7,6 @@ use super::scallops::Scallops;
 use super::series::Series;
 use super::texts::PictureTexts;
 use super::track::Track;
-use approach::Kind;
 use glam::DVec3;
 use job::Job;
 use oracle::Oracle;
@@ -60,7 +59,7 @@ pub struct Remarks {
 /// Content of the page.
 pub(super) struct Content<'a> {
     pub(super) job: &'a Job,
-    pub(super) approach: Kind,
+    pub(super) approach: Option<&'static str>,
     pub(super) oracle: &'a Oracle,
     pub(super) mesh: &'a Mesh,
     pub(super) record: &'a Record,

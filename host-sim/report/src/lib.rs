@@ -45,7 +45,6 @@ mod view;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use approach::Kind;
 use job::Job;
 use oracle::{Oracle, PassSample, SampleCheck};
 use verify::survey::SurveyResult;
@@ -60,7 +59,8 @@ pub use scallops::{RidgePoint, Scallops};
 #[derive(Clone, Debug)]
 pub struct Sketch {
     job: Job,
-    approach: Kind,
+    /// Name of the approach; `None`: the product, on the core.
+    approach: Option<&'static str>,
     record: record::Record,
     track: track::Track,
     series: series::Series,
@@ -74,17 +74,20 @@ impl Sketch {
         let period_s = job.machine.period_s();
         Self {
             job: job.clone(),
-            approach: Kind::Surface,
+            approach: None,
             track: track::Track::new(job.feed_mm_s(), period_s, passes),
             series: series::Series::new(period_s, record.middle_pass),
             record,
         }
     }
 
-    /// Sets the approach of the run.
+    /// Names the approach of a run that is not the core's.
     #[must_use]
-    pub fn by(self, approach: Kind) -> Self {
-        Self { approach, ..self }
+    pub fn by(self, approach: &'static str) -> Self {
+        Self {
+            approach: Some(approach),
+            ..self
+        }
     }
 
     /// The next sample of the run, in the order of the ticks, with what its check found.

@@ -7,7 +7,6 @@ use super::number::{duration, fixed, grouped, significant};
 use super::payload::payload;
 use super::scallops::Scallops;
 use super::svg::escape;
-use approach::Kind;
 use job::{Along, Job};
 use verify::survey::SurveyResult;
 
@@ -280,8 +279,8 @@ fn interval_words(content: &Content<'_>) -> String {
 fn footer(out: &mut String, content: &Content<'_>) {
     let emitter = match (&content.remarks.source, content.approach) {
         (Some(source), _) => format!("those of {}", escape(source)),
-        (None, Kind::Surface) => "those that the core emitted".to_owned(),
-        (None, other) => format!("those of the approach <code>{}</code>, in f64", other.name()),
+        (None, None) => "those that the core emitted".to_owned(),
+        (None, Some(approach)) => format!("those of the approach <code>{approach}</code>, in f64"),
     };
     let _ = writeln!(
         out,

@@ -25,7 +25,7 @@ pub(super) fn command(
     let bar = spinner("computing the passes");
     let passes = count_passes(job)?;
     bar.finish_and_clear();
-    let mut sketch = directory.map(|_| Sketch::new(job, passes).by(kind));
+    let mut sketch = directory.map(|_| Sketch::new(job, passes).by(kind.name()));
     let (mut trace, whole) = begun(wanted, job)?;
     let mut written = Ok(());
     let bar = progress(passes as u64, "following");

@@ -33,7 +33,7 @@ fn a_face_that_is_larger_than_the_store_is_streamed() {
     let face = face(surface, vec![boundary], 1.0);
     let made = machinable("rough", &face, &Options::default()).unwrap();
     assert_eq!((made.form.clone(), made.patches), (Form::Exact, 400));
-    assert!(machine::prepare::patch_count(&made.spec()).is_err());
+    assert!(patches::records::patch_count(&made.spec()).is_err());
 }
 
 /// A closed tube of degree 5 about the z axis: periodic knots, uneven, of a period that is no round number.

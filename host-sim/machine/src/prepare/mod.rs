@@ -2,7 +2,7 @@
 //! piece is one bicubic patch (rational where the surface is); ranges become patches with centred parameters.
 //!
 //! ```text
-//! SurfaceSpec ──patches.rs──► bicubic pieces over any rectangle ──grid.rs──► records of the core ──► Prepared
+//! SurfaceSpec ──patches──► bicubic pieces over any rectangle ──► records of the core ──grid.rs──► Prepared
 //! ```
 
 mod axes;
@@ -20,9 +20,8 @@ use job::{Along, AlongChoice, Job, JobError, StartChoice, SurfaceSpec};
 use patches::pieces::Source;
 
 pub(crate) use geometry::SurfaceEvaluator;
-pub use grid::{patch_count, streamed_patch_count};
 pub use steps::{config as step_config, configuration};
-pub use stream::{PATCHES_MAX, streamed};
+pub use stream::streamed;
 
 /// One parameter of the prepared surface: its spans, in the parameter's own units.
 #[derive(Clone, Debug, PartialEq)]
@@ -221,7 +220,7 @@ fn revolved(
         job.origin.error(
             "surface",
             format!("the machine cannot represent this surface: {error}"),
-            grid::REMEDY,
+            patches::records::REMEDY,
         )
     })?;
     let [profile, angle] = [u, v_rad].map(|range| ParameterSpans {

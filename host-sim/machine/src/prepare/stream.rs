@@ -10,9 +10,6 @@ use protocol::digest::Digest;
 
 use super::Prepared;
 
-/// Patches of a job at most: their words, and the time in which they are placed and prepared, stay within reason.
-pub const PATCHES_MAX: usize = 65_536;
-
 const CUT: &str = "use fewer knots, or cut the part into several jobs";
 
 /// The job, streamed where it does not fit into the board's store.
