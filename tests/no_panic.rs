@@ -1,5 +1,5 @@
-//! No panic is reachable from the sample task and the planning task; `firmware/no-panic` describes how the linker proves it. The test links the
-//! image, and as controls links it with a panic in either task, which must fail with the name of the missing function.
+//! No panic is reachable from the sample task, the planning task and the task of a failing supply; `firmware/no-panic` describes how the linker proves it. The test
+//! links the image, and as controls links it with a panic in each of them, which must fail with the name of the missing function.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -28,7 +28,11 @@ fn the_real_time_tasks_link_without_a_panic_and_the_controls_do_not() {
     let said = String::from_utf8_lossy(&proof.stderr);
     assert!(proof.status.success(), "{said}");
 
-    for feature in ["with-a-panic", "with-a-panic-in-planning"] {
+    for feature in [
+        "with-a-panic",
+        "with-a-panic-in-planning",
+        "with-a-panic-in-supply",
+    ] {
         let control = link(feature);
         let said = String::from_utf8_lossy(&control.stderr);
         assert!(!control.status.success(), "the control {feature} links");

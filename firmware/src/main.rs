@@ -10,8 +10,9 @@
 //!
 //! Tasks communicate through queues of fixed capacity with one writer and one reader. The
 //! machine itself is shared by `sample`, which gets it without a lock, `plan`, which locks it for the planning of a period, and `idle`, which locks
-//! it for one short call at a time ([`guarded_machine`]). The planning follows the sample that pended it, and takes a quarter of the period at most, so
-//! that its lock delays a sample only where it is late, which is a fault. No lock delays `receive`, which shares no data. The tool path is computed in
+//! it for one short call at a time ([`guarded_machine`]). The planning follows the sample that pended it, and takes 36 000 cycles (21 % of the period) at most, so
+//! that its lock delays a sample only where it is late, which is a fault. The record of a failing supply is shared by `supply` and `idle`, whose lock holds all tasks
+//! off for a copy of 44 bytes; the machine's lock does not hold off `receive`. The tool path is computed in
 //! `interp-core`; requests are handled in `controller`; board-specific code is in
 //! [`board`].
 #![no_std]
@@ -58,7 +59,7 @@ mod app {
             sample_timer::{SampleTimer, uptime_periods},
             serial::{self, Receiver, Transmitter, bytes_lost},
             status_led::StatusLed,
-            step_output::StepDriver,
+            step_output::{StepDriver, StepSetup},
             watchdog::Watchdog,
         },
         events::{EventMemory, EventSource},
@@ -128,10 +129,11 @@ mod app {
         let output = StepDriver::new(
             board.tim1,
             board.dma2,
-            board::WIRING,
-            board::PLUS_IS_HIGH,
-            SLOT_COUNTS,
-            0,
+            StepSetup {
+                wiring: board::WIRING,
+                plus_is_high: board::PLUS_IS_HIGH,
+                slot_counts: SLOT_COUNTS,
+            },
             (context.local.slots, context.local.rest),
         );
         if !output.is_present() {
@@ -189,7 +191,7 @@ mod app {
     ///
     /// | | |
     /// |---|---|
-    /// | priority | 2: only `receive` interrupts it |
+    /// | priority | 2: `receive` and `supply` interrupt it |
     /// | period | 1 ms, by TIM2 |
     /// | worst case | see `cargo sim budget`; the board measures each tick and reports the maximum (`tick_cycles_max`) |
     /// | over a fifth of the period | a fault of the run (`tick-over-budget`), which stops along the path |
@@ -211,7 +213,7 @@ mod app {
     ///
     /// | | |
     /// |---|---|
-    /// | priority | 1: `receive` interrupts it, and `sample` until it has locked the machine |
+    /// | priority | 1: `receive` and `supply` interrupt it, and `sample` until it has locked the machine |
     /// | period | 1 ms, after the sample |
     /// | worst case | 36 000 cycles, 21 % of the period; see `cargo sim budget` |
     /// | a miss | the next sample is due before the end: counted, reported, and a fault of the run (`deadline-missed`), which stops along the path; in lockstep time waits |
@@ -229,7 +231,7 @@ mod app {
     /// | period | none |
     /// | worst case | the ten words of a record: 0.2 ms, 1.1 ms by the chip's data sheet |
     /// | a miss | the record before it stands, and the pass is machined again |
-    /// | a panic | cannot be reached, as in the sample task |
+    /// | a panic | cannot be reached: `firmware/no-panic` does not link otherwise |
     #[task(binds = PVD, priority = 4, shared = [falling])]
     fn supply(mut context: supply::Context) {
         context
@@ -244,7 +246,7 @@ mod app {
     /// |---|---|
     /// | priority | 3: the port has no FIFO, and a tick may take 18 byte times |
     /// | period | 11 us at 921 600 baud, while the host sends |
-    /// | worst case | a few dozen cycles, and the few instructions that hold all interrupts off; a line of the log does not; a word that is written to flash, 16 us, holds the program |
+    /// | worst case | a few dozen cycles, plus the longest time with interrupts masked: a few instructions, or a word being written to flash (16 us, 100 us at most). The log masks none |
     /// | a miss | the byte is lost and counted; its frame fails its check, and the host repeats it |
     #[task(binds = USART1, priority = 3, local = [receiver, bytes_in])]
     fn receive(context: receive::Context) {

@@ -1,10 +1,12 @@
-//! The firmware's drivers that the task is made of: the same files.
+//! The firmware's drivers that the tasks are made of: the same files.
 #![allow(dead_code, reason = "the time stamp is the log's, which is not here")]
 
 #[path = "../../src/drivers/cycle_counter.rs"]
 pub(crate) mod cycle_counter;
 #[path = "../../src/drivers/drive_enable.rs"]
 pub(crate) mod drive_enable;
+#[path = "../../src/drivers/flash.rs"]
+pub(crate) mod flash;
 #[path = "../../src/drivers/gpio.rs"]
 pub(crate) mod gpio;
 #[path = "../../src/drivers/iwdg.rs"]

@@ -1,10 +1,10 @@
-//! The proof that no panic can be reached from the sample task and the planning task, made by the linker.
+//! The proof that no panic can be reached from the sample task, the planning task and the task of a failing supply, made by the linker.
 //!
-//! This image has the firmware's tasks (`sample_task.rs` and `plan_task.rs`, the same files) under the same RTIC handlers, with minimal
+//! This image has the firmware's tasks (`sample_task.rs`, `plan_task.rs`, `drivers/supply.rs` and `drivers/flash.rs`, the same files) under the same RTIC handlers, with minimal
 //! code at the other ends of its queues, and a panic handler that calls an undefined function. If a
 //! panic is reachable, the handler stays in the image, and the linker reports the undefined symbol. Flags,
-//! profile and target are the firmware's; `tests/no_panic.rs` links it, and checks that linking fails with the feature
-//! `with-a-panic` or `with-a-panic-in-planning`. The image is never run.
+//! profile and target are the firmware's; `tests/no_panic.rs` links it, and checks that linking fails with each of the features
+//! `with-a-panic`, `with-a-panic-in-planning` and `with-a-panic-in-supply`. The image is never run.
 //!
 //! Limits of the proof: the compiler removes code that it can prove unreachable, so a check that cannot fail but
 //! that the compiler cannot prove so counts as a panic. Processor faults and the other tasks are not covered.
@@ -13,6 +13,11 @@
 
 use defmt as _;
 
+/// What the drivers need of a board.
+mod board {
+    /// Clock of TIM2, as on the chip.
+    pub(crate) const TIMER_HZ: u32 = 84_000_000;
+}
 mod drivers;
 #[path = "../../src/events.rs"]
 mod events;
@@ -36,8 +41,15 @@ mod app {
 
     use crate::{
         drivers::{
-            cycle_counter::CycleCounter, drive_enable::DriveEnable, gpio::Ports, safety_inputs::SafetyInputs,
-            sample_timer::SampleTimer, step_output::StepDriver, watchdog::Watchdog,
+            cycle_counter::CycleCounter,
+            drive_enable::DriveEnable,
+            flash::{self, FallingFlash},
+            gpio::Ports,
+            safety_inputs::SafetyInputs,
+            sample_timer::SampleTimer,
+            step_output::{StepDriver, StepSetup},
+            supply::FallingRecord,
+            watchdog::Watchdog,
         },
         events::{EventMemory, EventSource},
         plan_task,
@@ -56,6 +68,7 @@ mod app {
     #[shared]
     struct Shared {
         real_time: RealTime<&'static mut [i32; STORE_WORDS]>,
+        falling: FallingRecord<FallingFlash>,
     }
 
     #[local]
@@ -82,8 +95,14 @@ mod app {
             step: [12, 13, 14],
             direction: [Pin(Port::C, 6), Pin(Port::C, 7), Pin(Port::C, 8)],
         };
+        let setup = StepSetup {
+            wiring,
+            plus_is_high: 0b111,
+            slot_counts: 168,
+        };
         let (slots, rest) = (context.local.slots, context.local.rest);
-        let output = StepDriver::new(device.TIM1, device.DMA2, wiring, 0b111, 168, 0, (slots, rest));
+        let output = StepDriver::new(device.TIM1, device.DMA2, setup, (slots, rest));
+        let (_, _, falling) = flash::sectors(device.FLASH);
         let mut real_time = RealTime::with_store(context.local.store);
         if let Ok(steps) = StepConfig::DEFAULT.check() {
             real_time.set_step_pins(steps, wiring.step);
@@ -97,7 +116,10 @@ mod app {
         let (commands_in, commands_out) = context.local.commands.split();
         let (events_in, events_out) = context.local.events.split();
         (
-            Shared { real_time },
+            Shared {
+                real_time,
+                falling: FallingRecord::new(falling),
+            },
             Local {
                 task: SampleTask::new(timer, counter, commands_out, events_in),
                 guards,
@@ -109,7 +131,7 @@ mod app {
     }
 
     /// The firmware's sample task. The machine's state is opaque to the compiler, so it may be any state.
-    #[task(binds = TIM2, priority = 3, shared = [real_time], local = [task, guards, output])]
+    #[task(binds = TIM2, priority = 2, shared = [real_time], local = [task, guards, output])]
     fn sample(mut context: sample::Context) {
         let sample::LocalResources {
             task, guards, output, ..
@@ -130,8 +152,19 @@ mod app {
         assert!(black_box(true), "the control");
     }
 
-    /// The other ends of the queues: any command may arrive, and each event is read.
-    #[idle(shared = [real_time], local = [commands_in, events_out])]
+    /// The firmware's task of a failing supply.
+    #[task(binds = PVD, priority = 4, shared = [falling])]
+    fn supply(mut context: supply::Context) {
+        context
+            .shared
+            .falling
+            .lock(|falling| falling.changed(black_box(true)));
+        #[cfg(feature = "with-a-panic-in-supply")]
+        assert!(black_box(true), "the control");
+    }
+
+    /// The other ends of the queues: any command may arrive, each event is read, and any record may be prepared.
+    #[idle(shared = [real_time, falling], local = [commands_in, events_out])]
     fn idle(mut context: idle::Context) -> ! {
         loop {
             let command = black_box(Instruction::Run { ticks: 0 });
@@ -139,6 +172,9 @@ mod app {
             black_box(context.local.events_out.dequeue());
             context.shared.real_time.lock(|real_time| {
                 black_box(real_time);
+            });
+            context.shared.falling.lock(|falling| {
+                black_box(falling);
             });
         }
     }

@@ -51,20 +51,31 @@ pub(crate) struct StepDriver {
 /// Ticks after a change of the idle word until a buffer holds nothing else: the one that is output at the change is cleared whole only when it is output again.
 const SETTLE_TICKS: u8 = 2;
 
+/// The pins of a board and the clock of its slots.
+pub(crate) struct StepSetup {
+    /// Step and direction pins.
+    pub(crate) wiring: Wiring,
+    /// Axes whose direction pin is high towards plus, one bit each.
+    pub(crate) plus_is_high: u8,
+    /// Counts of TIM1 per slot; see [`controller::step_output::slot_counts`].
+    pub(crate) slot_counts: u16,
+}
+
 impl StepDriver {
-    /// Starts the output; see [`StepOutput::start`]. `rest`: [`interp_core::Steps::rest`]. `plus_is_high`: axes whose direction pin is high
-    /// towards plus, a bit each. `inverted`: axes whose step pulses are low, likewise.
+    /// Starts the output with step pins that are low at rest; see [`StepOutput::start`]. `rest`: the idle word ([`interp_core::Steps::rest`]).
     pub(crate) fn new(
         timer: pac::TIM1,
         dma: pac::DMA2,
-        wiring: Wiring,
-        plus_is_high: u8,
-        slot_counts: u16,
-        inverted: u8,
+        setup: StepSetup,
         (buffers, rest): (&'static mut Buffers, &'static mut u32),
     ) -> Self {
+        let StepSetup {
+            wiring,
+            plus_is_high,
+            slot_counts,
+        } = setup;
         let bits = wiring.step.map(|pin| 0x1_0001 << (pin & 15));
-        *rest = idle_word(bits, inverted);
+        *rest = idle_word(bits, 0);
         for slot in buffers.iter_mut().flatten() {
             *slot = *rest;
         }

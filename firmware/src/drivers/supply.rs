@@ -1,6 +1,6 @@
-//! The supply: its falling is noticed by the chip's voltage detector (PVD, 2.9 V), and journalled before it is too low.
+//! The supply: the chip's voltage detector (PVD, 2.9 V) reports that it falls, and the journal's record is written before the voltage is too low for it.
 //!
-//! The record was made before, so that its ten words are all that is left to do: 0.2 ms, 1.1 ms at most. Whatever the voltage does then, a record that is not whole does not
+//! The record is prepared in advance, so that only its ten words have to be written: 0.2 ms, 1.1 ms at most. A record that was cut short does not
 //! count. While the voltage is low the drives count as faulty.
 
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -38,7 +38,7 @@ impl<F: NorFlash> FallingRecord<F> {
         }
     }
 
-    /// Has this record written when the supply falls.
+    /// Sets the record that is written when the supply falls.
     pub(crate) fn set(&mut self, prepared: Option<Prepared>) {
         self.prepared = prepared;
     }
