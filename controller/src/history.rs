@@ -1,4 +1,4 @@
-//! The latest events of a session, as they were sent, so that the host can have them again.
+//! The latest events of a session, as they were sent, so that the host can request them again.
 //!
 //! A ring of bytes: for each event the length of its frame (two bytes, low one first) and the frame. A new event drops the oldest ones. Only the link touches
 //! it, so it costs the sample timer nothing.
@@ -19,6 +19,7 @@ pub(crate) struct History {
     bytes: [u8; BYTES],
     /// Where the oldest event begins.
     start: usize,
+    /// Bytes of all events kept.
     used: usize,
     /// Number of the oldest event kept; of the next one where none is.
     first: u32,

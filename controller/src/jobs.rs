@@ -17,17 +17,21 @@ use crate::storage::StorageError;
 
 /// Bytes of an entry's head.
 const HEAD: usize = 284;
-/// A word, and the two words behind a job's.
+/// Bytes of a word.
 const WORD: u32 = 4;
+/// Bytes of the two words behind a job's.
 const TAIL: u32 = 2 * WORD;
+/// Bytes of the CRC of a head.
 const CRC: usize = 4;
-/// Bytes before what the job has: mark, sequence number, words, name.
+/// Bytes before the [`StoredJob`] in a head: mark, sequence number, words, name.
 const BEGIN: usize = 12 + JOB_NAME_MAX;
 const _: () = assert!(BEGIN + STORED_JOB_BYTES_MAX + CRC == HEAD && HEAD.is_multiple_of(WORD as usize));
 
-/// First word of a head, and the last of a whole job.
+/// First word of a head.
 const MARK: u32 = 0x626f_6a31;
+/// The word behind the words of a job that was stored to its end.
 const WHOLE: u32 = 0x6c6c_6121;
+/// A word of erased flash.
 const BLANK: u32 = u32::MAX;
 
 /// Words written or read at once.
@@ -36,9 +40,11 @@ const CHUNK: usize = 16;
 /// Where a job is kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct JobPlace {
-    /// Offset of its entry, and its words.
+    /// Offset of its entry, bytes.
     offset: u32,
+    /// Number of its words.
     words: u32,
+    /// The greater one of two jobs was stored later.
     sequence: u32,
 }
 
@@ -81,8 +87,9 @@ enum Entry {
 #[derive(Clone, Debug, PartialEq)]
 pub struct JobStore<F> {
     flash: F,
-    /// The end of what is written in each sector.
+    /// Offset of the first free byte of each sector.
     ends: [u32; 2],
+    /// Sequence number of the job that was begun last.
     sequence: u32,
     writing: Option<Writing>,
 }
@@ -92,8 +99,9 @@ pub struct JobStore<F> {
 struct Writing {
     place: JobPlace,
     name: Name,
+    /// Digest of all its words, as announced.
     digest: u64,
-    /// Its words so far.
+    /// Words written so far.
     done: u32,
 }
 
@@ -177,7 +185,7 @@ impl<F: NorFlash> JobStore<F> {
         Entry::Job(place, name, is_kept)
     }
 
-    /// Goes through the entries of a sector, until it is the one.
+    /// Goes through the jobs of a sector up to the first one for which `is_it` holds, of its place, its name and whether it is kept.
     fn walk(&mut self, sector: u32, mut is_it: impl FnMut(&JobPlace, &Name, bool) -> bool) -> Walked {
         let mut walked = Walked {
             end: sector * Self::SECTOR,
@@ -212,7 +220,7 @@ impl<F: NorFlash> JobStore<F> {
         })
     }
 
-    /// The first kept job that it is.
+    /// The first kept job for which `is_it` holds.
     #[inline(never)]
     fn first(&mut self, mut is_it: impl FnMut(&JobPlace, &Name) -> bool) -> Option<JobPlace> {
         let mut sectors = [0, 1].into_iter();
@@ -236,7 +244,7 @@ impl<F: NorFlash> JobStore<F> {
         newest
     }
 
-    /// What a job has apart from its words.
+    /// A job without its words.
     #[inline(never)]
     pub fn job(&mut self, place: &JobPlace) -> Option<StoredJob> {
         let mut bytes = [0; STORED_JOB_BYTES_MAX];
@@ -317,10 +325,10 @@ impl<F: NorFlash> JobStore<F> {
         Ok(())
     }
 
-    /// Ends a job: it is kept from here on, and one of the same name is not any more.
+    /// Ends a job: from here on it is kept, in place of an earlier one of its name.
     ///
     /// # Errors
-    /// Words are missing or read back differently, or the flash cannot be written: the job is not kept.
+    /// Words are missing or read back differently: the job is not kept. The flash cannot be written: the job may be kept, and the earlier one with it.
     pub fn finish(&mut self) -> Result<(), StorageError> {
         let Writing {
             place,
@@ -335,7 +343,7 @@ impl<F: NorFlash> JobStore<F> {
         self.delete_others(&place, &name)
     }
 
-    /// Keeps a job no longer. Returns whether there was one.
+    /// Deletes the job of this name. Returns whether there was one.
     ///
     /// # Errors
     /// The flash cannot be written.
@@ -406,10 +414,13 @@ impl<F: NorFlash> JobStore<F> {
     }
 }
 
-/// The way through a sector.
+/// What a walk through a sector has found.
 struct Walked {
+    /// Offset behind the last entry that was passed.
     end: u32,
+    /// Greatest sequence number.
     newest: u32,
+    /// The job at which the walk has ended.
     taken: Option<JobPlace>,
 }
 

@@ -1,9 +1,9 @@
-//! What of a run is journalled, and when.
+//! The journal of a run: its records, and when they are written.
 //!
-//! **After each pass** a record is written, some periods after the pass: the step output lags behind the samples, so only then the axes have been there.
-//! **Within a pass** a record is kept at hand, for the supply's falling ([`crate::storage::Storage::prepare`]) and for a run that is cut short: that the pass is complete up to a
-//! place that the tool left 100 to 150 periods before. So much may be between the moment at which the drives let go, or a cutter broke, and that at which the board notices;
-//! a resume machines it again. Without such a record the one before stands, and the pass is machined again.
+//! **After each pass** a record is written, some periods later: the step output lags behind the samples, and only then the axes have reached the end of the pass.
+//! **Within a pass** a record is prepared for a failing supply ([`crate::storage::Storage::prepare`]) and for a run that is cut short. It says that the pass is complete up to a
+//! place that the tool left 100 to 150 periods before. The board may notice that much later that the drives let go or a cutter broke;
+//! a resume machines this part again. Without such a record the one before stands, and the pass is machined again.
 
 use interp_core::sample::RunStart;
 use protocol::message::Journal;
@@ -11,17 +11,21 @@ use protocol::message::Journal;
 /// Periods from the first sample of a pass until the one before is complete at the axes: two of the step output, and one in which the sample may have been late.
 const LAG_PERIODS: u32 = 3;
 
-/// Periods between the places that are noted, and their number: the oldest counts.
+/// Periods between two places that are noted.
 const PLACE_PERIODS: u32 = 50;
+/// Places that are kept; the oldest one is journalled.
 const PLACES: usize = 3;
 
 /// The record that is due next, and the places that the tool was at last.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Journalling {
+    /// The record that is due once the axes have followed.
     next: Option<Journal>,
+    /// Since when it waits, periods since power-up.
     since: Option<u32>,
-    /// The oldest first.
+    /// The latest places, the oldest first.
     places: [Option<RunStart>; PLACES],
+    /// When the last place was noted, periods since power-up.
     noted: u32,
 }
 
@@ -33,7 +37,7 @@ impl Journalling {
         noted: 0,
     };
 
-    /// A run has come this far, in place of what was noted before.
+    /// Notes how far a run has come, in place of an earlier note that was not written yet.
     pub(crate) fn note(&mut self, next: Option<Journal>) {
         self.next = next;
         self.since = None;
@@ -47,7 +51,7 @@ impl Journalling {
             return None;
         }
         self.note(None);
-        // What is complete by the record needs no place.
+        // Places on passes that the record says are complete.
         for place in &mut self.places {
             *place = place.filter(|place| place.pass >= next.pass && !next.is_finished);
         }

@@ -101,7 +101,7 @@ impl Link {
         }
     }
 
-    /// Journals what of a run is due, and looks at the start button. To be called once a period or more often; `now`: periods since power-up.
+    /// Writes the records of the journal that are due, and looks at the start button. To be called once a period or more often; `now`: periods since power-up.
     pub fn keep_journal(&mut self, now: u32, machine: &mut impl Machine) {
         self.session.keep_journal(now, machine);
         self.session.watch_button(now, machine);

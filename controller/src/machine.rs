@@ -164,7 +164,7 @@ pub trait Machine {
     /// The storage cannot be written, or is full until the next power-up.
     fn keep_journal(&mut self, journal: &Journal) -> Result<(), StorageError>;
 
-    /// Has this record written when the supply falls, at once and without further ado; none: none is. After each [`Self::keep_journal`] it is to be given again.
+    /// Sets the record that is written when the supply falls; none: nothing is written then. To be set again after each [`Self::keep_journal`].
     fn prepare_journal(&mut self, journal: Option<&Journal>);
 
     /// [`crate::realtime::RealTime::place`].

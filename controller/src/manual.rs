@@ -42,7 +42,18 @@ const SETTLE_TICKS: u32 = 40;
 /// Greatest speed while the safety door is open, mm/s: the 2 m/min of setting up (ISO 16090-1).
 pub const DOOR_MM_S: f32 = 33.0;
 
-/// A jog, probe move or homing that is asked for.
+/// A move towards a probe.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ProbeMove {
+    /// The axis, from 0.
+    pub axis: u8,
+    /// Greatest distance, nm.
+    pub nm: i32,
+    /// Speed, mm/s.
+    pub speed_mm_s: f32,
+}
+
+/// A jog, probe move or homing that the host requests.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Motion {
     /// See `Request::Jog`.
@@ -53,14 +64,7 @@ pub enum Motion {
         speed_mm_s: f32,
     },
     /// See `Request::Probe`.
-    Probe {
-        /// The axis, from 0.
-        axis: u8,
-        /// Greatest distance, nm.
-        nm: i32,
-        /// Speed, mm/s.
-        speed_mm_s: f32,
-    },
+    Probe(ProbeMove),
     /// See `Request::Home`.
     Home {
         /// One bit an axis; none: all.
@@ -73,7 +77,7 @@ pub enum Motion {
 impl Motion {
     /// Refuses a speed that is not a finite one above 0: compared with a bound, a NaN would pass as any speed.
     fn check_speed(self) -> Result<(), Reason> {
-        let (Self::Jog { speed_mm_s, .. } | Self::Probe { speed_mm_s, .. }) = self else {
+        let (Self::Jog { speed_mm_s, .. } | Self::Probe(ProbeMove { speed_mm_s, .. })) = self else {
             return Ok(());
         };
         if speed_mm_s.is_finite() && speed_mm_s > 0.0 {
@@ -102,8 +106,9 @@ pub(crate) struct Manual {
     status: MotionStatus,
     digest: Digest,
     line: Line,
-    /// The axis whose contact is looked for, and its two positions before the present one, the older one first.
+    /// The leading axis of the move, which is the one of a contact.
     axis: u8,
+    /// Its two positions before the present one, nm, the older one first.
     before_nm: [i32; 2],
     /// The present motion is a continuous jog this way.
     repeated: Option<JogWay>,
@@ -232,7 +237,7 @@ impl Manual {
         self.repeated = None;
     }
 
-    /// The input that the present motion looks for.
+    /// The input towards which the present motion moves.
     fn wanted(&self) -> InputLines {
         match self.status.activity {
             Activity::Probe => InputLines::PROBE,

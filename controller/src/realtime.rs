@@ -14,26 +14,23 @@
 //! **Inputs.** Evaluated in every tick of the timer, in lockstep also between periods; see [`crate::safety`].
 
 mod control;
+mod load;
 mod pause;
 mod run;
 mod start;
+mod status;
 
 use interp_core::{
     command::{Command, Inputs},
     fault::{Fault, FaultKind, Result},
     interpolator::Interpolator,
-    job::{Header, STORE_WORDS, stream::RecordCopy},
-    sample::{RunStart, Sample, State},
+    job::STORE_WORDS,
+    sample::State,
     steps::{BUFFER_WORDS, CheckedSteps, Steps},
 };
-use protocol::message::{
-    Clock, FaultReport, InputLines, Report, ResetCause, SafetyStatus, Status, StreamStatus,
-};
+use protocol::message::{Clock, InputLines, Report, ResetCause};
 
-use self::{
-    control::{Control, Planning},
-    run::RunRecord,
-};
+use self::control::{Control, Planning};
 use crate::{
     machine::{Event, Events, Instruction},
     safety::Stop,
@@ -48,17 +45,6 @@ pub struct TickInput {
     pub cycles: u32,
     /// The present safety inputs.
     pub lines: InputLines,
-}
-
-/// Copies words from an offset on; returns their number.
-pub(crate) fn copy_words(from: &[i32], offset: u32, to: &mut [i32]) -> usize {
-    let from = from.get(offset as usize..).unwrap_or(&[]);
-    let mut count = 0;
-    for (to, from) in to.iter_mut().zip(from) {
-        *to = *from;
-        count += 1;
-    }
-    count
 }
 
 /// Whether the tool moves, so that each sample belongs to the run.
@@ -448,58 +434,6 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         self.control.put(halted, events);
     }
 
-    /// The status; the link fills in `frames_bad`, `events`, `steps` and `profile`.
-    #[must_use]
-    #[inline(never)]
-    pub fn status(&self) -> Status {
-        self.status_now()
-    }
-
-    /// The status, inlined into its callers.
-    #[inline(always)]
-    fn status_now(&self) -> Status {
-        let run = &self.control.run;
-        let last = self.interpolator.last();
-        let fault = self.interpolator.fault();
-        let (pass, path, side) = if fault.is_some() {
-            self.interpolator.surface_position()
-        } else {
-            (last.pass, last.path, last.side)
-        };
-        let [received, room] = self.interpolator.load_room();
-        Status {
-            state: self.interpolator.state(),
-            fault: fault.map(FaultReport::from),
-            clock: self.control.clock,
-            credit: self.control.credit,
-            report: self.control.report,
-            tick: last.tick,
-            pass,
-            path,
-            side,
-            samples: run.samples,
-            digest: run.digest.value(),
-            interval: self.interpolator.last_interval(),
-            deadline_misses: run.deadline_misses,
-            tick_cycles_max: run.tick_cycles_max,
-            samples_lost: run.events_lost,
-            frames_bad: 0,
-            halts: self.control.halts,
-            events: 0,
-            steps: 0,
-            profile: 0,
-            stream: StreamStatus {
-                received,
-                room,
-                starved: run.starved,
-            },
-            safety: SafetyStatus {
-                spindle: self.control.spindle.now(),
-                ..self.control.safety.status()
-            },
-        }
-    }
-
     /// Reports a sign of life of the host.
     pub const fn heard(&mut self) {
         self.control.safety.heard(self.control.spindle.is_commanded());
@@ -525,101 +459,5 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
     #[inline]
     pub const fn feeds_watchdog(&self, missed: u32, cycles: u32) -> bool {
         missed == 0 && cycles <= self.control.tick_budget
-    }
-
-    /// [`Interpolator::loaded`].
-    #[must_use]
-    pub fn loaded(&self) -> Option<(&Header, &[i32])> {
-        self.interpolator.loaded()
-    }
-
-    /// Copies words of the loaded job from an offset on; returns their number.
-    pub fn loaded_words(&self, offset: u32, words: &mut [i32]) -> usize {
-        let loaded = self.loaded().map_or(&[][..], |(_, loaded)| loaded);
-        copy_words(loaded, offset, words)
-    }
-
-    /// [`Interpolator::place`].
-    #[must_use]
-    pub fn place(&self) -> Option<RunStart> {
-        self.interpolator.place()
-    }
-
-    /// The last sample.
-    #[must_use]
-    pub const fn last(&self) -> &Sample {
-        self.interpolator.last()
-    }
-
-    /// Begins to load a job; a queued command was for the previous job and is dropped.
-    ///
-    /// # Errors
-    /// Those of [`Interpolator::load_begin`]; nothing changes then.
-    pub fn load_begin(&mut self, header: &Header, words: u32) -> Result<()> {
-        self.interpolator.load_begin(header, words)?;
-        self.control.command = None;
-        self.control.spindle.clear();
-        Ok(())
-    }
-
-    /// [`Interpolator::load_words`].
-    ///
-    /// # Errors
-    /// Those of the interpolator.
-    pub fn load_words(&mut self, offset: u32, words: &[i32]) -> Result<()> {
-        self.interpolator.load_words(offset, words)
-    }
-
-    /// [`Interpolator::load_room`].
-    #[must_use]
-    pub fn load_room(&self) -> [u32; 2] {
-        self.interpolator.load_room()
-    }
-
-    /// [`Interpolator::load_copy`].
-    ///
-    /// # Errors
-    /// Those of the interpolator.
-    pub fn load_copy(&self, record: u32) -> Result<RecordCopy> {
-        self.interpolator.load_copy(record)
-    }
-
-    /// [`Interpolator::load_accept`], or [`Interpolator::load_reject`] with a fault.
-    ///
-    /// # Errors
-    /// Those of the interpolator.
-    pub fn load_judged(&mut self, record: u32, checked: Result<()>) -> Result<()> {
-        if let Err(fault) = checked {
-            self.interpolator.load_reject(fault);
-            return checked;
-        }
-        self.interpolator.load_accept(record)
-    }
-
-    /// [`Interpolator::load_records`].
-    #[must_use]
-    pub fn load_records(&self) -> u32 {
-        self.interpolator.load_records()
-    }
-
-    /// [`Interpolator::load_check`].
-    ///
-    /// # Errors
-    /// Those of the interpolator.
-    pub fn load_check(&mut self, record: u32) -> Result<()> {
-        self.interpolator.load_check(record)
-    }
-
-    /// Seals the job: ready, with the counters of a run that has not begun.
-    ///
-    /// # Errors
-    /// Those of [`Interpolator::load_finish`].
-    pub fn load_finish(&mut self) -> Result<()> {
-        self.interpolator.load_finish()?;
-        [_, self.control.room] = self.interpolator.load_room();
-        self.control.command = None;
-        self.control.run = RunRecord::NEW;
-        self.control.from_home = true;
-        Ok(())
     }
 }

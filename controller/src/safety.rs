@@ -90,8 +90,11 @@ pub(crate) enum Stop {
 /// Sixteen two-bit vertical counters: bit n of both words is the count of input n.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Debounce {
+    /// Inputs as accepted.
     steady: u16,
+    /// Low bit of each input's count of ticks in which it differed.
     ones: u16,
+    /// High bit of the same.
     twos: u16,
 }
 
@@ -131,10 +134,13 @@ pub(crate) struct Safety {
     ticks_to_timeout: u32,
     status: SafetyStatus,
     debounce: Debounce,
-    /// Inputs whose level means the opposite, and inputs that are not read.
+    /// Inputs whose level means the opposite of the one in the board's table.
     inverted: InputLines,
+    /// Inputs that the machine does not have.
     ignored: InputLines,
+    /// The position stays valid while the drives are off.
     home_survives_off: bool,
+    /// Position last declared or found by homing, nm; valid while `status.homed`.
     home_nm: [i32; 3],
     /// Whether the end of a run is still to be reported.
     pub(crate) ending: bool,
@@ -245,7 +251,7 @@ impl Safety {
         self.settled = UNSETTLED;
     }
 
-    /// Reports a sign of life of the host. `is_commanded`: something is on for as long as the host is heard.
+    /// Reports a sign of life of the host. `is_commanded`: spindle or coolant is on by a command, and so only while the host is heard.
     pub(crate) const fn heard(&mut self, is_commanded: bool) {
         self.ticks_to_timeout = match self.status.configuration.link_timeout_ticks {
             _ if is_commanded => HEARD_TICKS,

@@ -50,7 +50,7 @@ pub(crate) struct Session {
     profile: u32,
     /// The job was loaded under another profile.
     is_outdated: bool,
-    /// [`job_mark`] of the job whose runs are journalled; none where the loaded one's are not.
+    /// [`protocol::message::job_mark`] of the job whose runs are journalled; none where the loaded one's are not.
     job: Option<u64>,
     journalling: Journalling,
     /// Spindle and coolant of the loaded job.

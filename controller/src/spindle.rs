@@ -24,7 +24,7 @@ pub mod output {
     pub const DUTY_SHIFT: u32 = 16;
 }
 
-/// Ticks after switching on in which the contact is not believed, at 1 ms: a drive takes its time to withdraw the report of another speed.
+/// Ticks after switching on in which the contact is ignored, at 1 ms: a drive takes its time to withdraw the report of its last speed.
 pub const SETTLE_TICKS: u32 = 100;
 
 /// Ticks below its speed in a row that pause a run, at 1 ms: longer than a tooth's load.
@@ -81,7 +81,7 @@ impl Spindle {
         self.clear();
     }
 
-    /// The next run has none.
+    /// Another job or profile: no spindle until it is ordered.
     pub(crate) const fn clear(&mut self) {
         self.order = SpindleOrder::OFF;
         self.end_run();
@@ -136,7 +136,7 @@ impl Spindle {
         self.is_commanded
     }
 
-    /// Whether it stands while the tool is lifted for a pause.
+    /// Whether it stops while the tool is lifted for a pause.
     pub(crate) fn stops_at_pause(&self) -> bool {
         self.settings.is_none_or(|settings| settings.stops_at_pause)
     }

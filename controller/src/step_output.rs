@@ -20,8 +20,8 @@
 //! is output 3/4 slot and cleared 1/4 slot before TIM2's interrupt; when the tick reads the active buffer, the switch is complete.
 //!
 //! **Directions** are set by the processor at the beginning of the tick ([`StepOutput::begin`]), on any port. The pattern leaves
-//! the first [`TURN_SLOTS`] slots and the drive's set-up time without pulses where an axis turns; the stream's counter shows whether the processor was
-//! in time is checked by the stream's counter, and a fault where it was not.
+//! the first [`TURN_SLOTS`] slots and the drive's set-up time without pulses where an axis turns. The stream's counter
+//! shows whether the pins were set in time; if not, it is a fault.
 //!
 //! **Too late.** A tick that has less than [`WRITE_SLOTS`] slots left, or none, writes nothing: the buffer is output without pulses, its
 //! steps are carried over to the next.

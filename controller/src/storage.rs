@@ -20,11 +20,13 @@ use protocol::frame::crc32;
 /// Bytes of a slot: what a record of the journal takes, 3276 in a sector of 128 KB.
 pub const SLOT: usize = 40;
 
-/// Bytes before the payload, and longest payload.
+/// Bytes before the payload.
 const HEAD: usize = 8;
+/// Bytes of the CRC.
 const CRC: usize = 4;
-/// Most slots of a record, and its bytes then.
+/// Most slots of a record.
 const SLOTS_MAX: usize = 6;
+/// Bytes of the longest record.
 const RECORD_MAX: usize = SLOTS_MAX * SLOT;
 /// Longest payload of a record, bytes.
 pub const PAYLOAD_MAX: usize = RECORD_MAX - HEAD - CRC;
@@ -104,7 +106,7 @@ enum Content {
 struct Active {
     /// 0 or 1.
     sector: u32,
-    /// The first slot behind its last record, and behind whatever else is not blank.
+    /// The first slot behind its last record and all others that are not blank.
     next: u32,
     /// Sequence number of the newest record; 0 where there is none.
     sequence: u32,
@@ -235,7 +237,7 @@ impl<F: NorFlash> Storage<F> {
     /// Keeps a record of a kind in place of the one before.
     ///
     /// # Errors
-    /// The payload is longer than a slot has room for, the flash fails, or it is full until the next power-up.
+    /// The payload is longer than [`PAYLOAD_MAX`], the flash fails, or it is full until the next power-up.
     pub fn keep(&mut self, kind: Kind, payload: &[u8]) -> Result<(), StorageError> {
         if self.active.next + slots_of(payload.len()) as u32 > Self::SLOTS {
             self.swap()?;
@@ -257,8 +259,9 @@ impl<F: NorFlash> Storage<F> {
         Ok(())
     }
 
-    /// A record for the slot behind the next one, so that it does not meet a record that is being written: it counts as soon as its bytes are there, until the next record.
-    /// None where there is no room. Whoever has written it calls [`Self::look_again`].
+    /// A record for the slot behind the next one, because a record may be half written in the next one when it is needed. It counts as soon as its bytes are written, until the next
+    /// record.
+    /// None where there is no room. After it was written, [`Self::look_again`] has to be called.
     pub fn prepare(&self, kind: Kind, payload: &[u8]) -> Option<Prepared> {
         let Active {
             sector,
@@ -279,7 +282,7 @@ impl<F: NorFlash> Storage<F> {
         })
     }
 
-    /// Finds the newest record anew: one was written that was prepared.
+    /// Finds the newest record again, after a prepared one was written.
     pub fn look_again(&mut self) {
         let [first, second] = [0, 1].map(|sector| self.look(sector, BLANK_SLOTS));
         let before = self.active;

@@ -15,26 +15,33 @@ use crate::machine::Machine;
 /// The upload under way.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Upload {
+    /// Words announced.
     words: u32,
+    /// Words received.
     received: u32,
+    /// Digest announced.
     wanted: u64,
+    /// Digest of the words received; unused for a streamed job.
     digest: Digest,
-    /// Of a streamed job.
+    /// The rows of a streamed job.
     rows: Option<Rows>,
 }
 
 /// The rows of a streamed job: each is followed by the digest of the words up to it, apart from those of the digests.
 #[derive(Clone, Copy, Debug)]
 struct Rows {
-    /// Words before the first row, words of a row with its digest, and patches of a row.
+    /// Words before the first row.
     head: u32,
+    /// Words of a row with its digest.
     words: u32,
+    /// Patches of a row.
     patches: u32,
     /// Records of the region, which come before the first row.
     edges: u32,
+    /// Digest of all words received, without those of digests.
     digest: Digest,
-    /// The words of the digest that came so far.
-    told: u64,
+    /// The last row's digest, as far as its words were received.
+    announced: u64,
     /// Records checked.
     checked: u32,
 }
@@ -48,7 +55,7 @@ impl Rows {
             patches: header.path_spans.into(),
             edges: region_checks(header),
             digest: Digest::new(),
-            told: 0,
+            announced: 0,
             checked: 0,
         }
     }
@@ -61,7 +68,7 @@ impl Rows {
         let left = self.words - within.unwrap_or(0);
         #[allow(clippy::cast_possible_truncation, reason = "2")]
         if within.is_some() && left <= DIGEST_WORDS as u32 {
-            self.told = (self.told >> 32) | u64::from(word.cast_unsigned()) << 32;
+            self.announced = (self.announced >> 32) | u64::from(word.cast_unsigned()) << 32;
         } else {
             self.digest.words(&[word]);
         }
@@ -71,13 +78,13 @@ impl Rows {
     /// Checks a row that is complete, a record at a time, so that a run is not delayed by more than a copy.
     #[inline(never)]
     fn check(&mut self, machine: &mut impl Machine) -> Result<(), Reason> {
-        if self.digest.value() != self.told {
+        if self.digest.value() != self.announced {
             #[allow(clippy::cast_precision_loss, reason = "a report; at most 2^20")]
             let bad = Fault::new(FaultKind::BadPatch, self.checked as f32);
             // It returns the same fault.
             let _ = machine.load_judged(self.checked, Err(bad));
             return Err(Reason::WrongDigest {
-                wanted: self.told,
+                wanted: self.announced,
                 received: self.digest.value(),
             });
         }

@@ -1,4 +1,4 @@
-//! What is asked for: checked, and its first move planned.
+//! Begins a motion: checks the request, and plans its first move.
 
 use interp_core::positioning::Line;
 use protocol::{
@@ -7,11 +7,11 @@ use protocol::{
 };
 
 use super::{
-    ALL_AXES, DEAD_MAN_TICKS, DOOR_MM_S, HEARD_TICKS, Manual, Motion, contact::Contact, homing::Homing,
-    setup::Setup,
+    ALL_AXES, DEAD_MAN_TICKS, DOOR_MM_S, HEARD_TICKS, Manual, Motion, ProbeMove, contact::Contact,
+    homing::Homing, setup::Setup,
 };
 
-/// What the rest of the board has to say about a motion.
+/// State of the board outside [`Manual`] that decides whether a motion may begin, and how fast it is.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Allowed {
     /// The debounced inputs.
@@ -25,7 +25,10 @@ pub(crate) struct Allowed {
 }
 
 impl Manual {
-    /// Begins a motion; `lines`: the debounced inputs.
+    /// Begins a motion, or stops the present one.
+    ///
+    /// # Errors
+    /// The reason of the refusal; nothing has changed.
     pub(crate) fn begin(&mut self, motion: Motion, allowed: &Allowed) -> Result<(), Reason> {
         let lines = allowed.lines;
         if motion == Motion::Stop {
@@ -58,10 +61,8 @@ impl Manual {
                 let speed_mm_s = speed_mm_s * f32::from(allowed.feed_override) * 0.01;
                 self.begin_jog(&setup, way, speed_mm_s, lines, known)
             }
-            Motion::Probe { .. } if allowed.spindle_turns => Err(Reason::SpindleTurns),
-            Motion::Probe { axis, nm, speed_mm_s } => {
-                self.begin_probe(&setup, axis, nm, speed_mm_s, lines, known)
-            }
+            Motion::Probe(_) if allowed.spindle_turns => Err(Reason::SpindleTurns),
+            Motion::Probe(probe) => self.begin_probe(&setup, probe, lines, known),
             Motion::Home { axes } => {
                 let profile = setup.homing().ok_or(Reason::NoHoming)?;
                 if axes & ALL_AXES & !profile.axes() != 0 {
@@ -102,12 +103,11 @@ impl Manual {
     fn begin_probe(
         &mut self,
         setup: &Setup,
-        axis: u8,
-        nm: i32,
-        speed_mm_s: f32,
+        probe: ProbeMove,
         lines: InputLines,
         known: u8,
     ) -> Result<(), Reason> {
+        let ProbeMove { axis, nm, speed_mm_s } = probe;
         let mut by_nm = [0; 3];
         let Some(by) = by_nm.get_mut(usize::from(axis)) else {
             return Err(Reason::OutOfRange {

@@ -6,10 +6,11 @@ const BOUNCE_TICKS: u32 = 15;
 /// Where the axis was when its contact closed.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Contact {
-    /// The position at the first raw contact.
+    /// The position at the first raw contact, nm.
     pub(super) touched_nm: Option<i32>,
-    /// Ticks since then, and the last of them at which the contact was open.
+    /// Ticks since the first contact.
     ticks: u32,
+    /// The last of these ticks in which the contact was open.
     open_at: u32,
 }
 

@@ -1,21 +1,25 @@
-//! The machine's profile, as far as motion outside a job, inputs and outputs need it.
+//! The part of the machine's profile for motion outside a job, inputs and outputs.
 
 use interp_core::positioning::LineLimits;
 use protocol::message::{AtSpeed, DoorContact, Homing, InputLines, Profile, Reason, SpindleSettings};
 
-/// The machine's profile, as far as motion outside a job needs it.
+/// The part of the machine's profile for motion outside a job, inputs and outputs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Setup {
     limits: LineLimits,
+    /// Least and greatest coordinate of each axis, nm.
     travel_nm: Option<[[i32; 2]; 3]>,
     /// Digest of the settings of the drives.
     steps: u32,
     homing: Option<Homing>,
-    /// Inputs whose level means the opposite, and inputs that are not read.
+    /// Inputs whose level means the opposite of the one in the board's table.
     inverted: InputLines,
+    /// Inputs that the machine does not have.
     ignored: InputLines,
     spindle: Option<SpindleSettings>,
+    /// Axes whose step pulses have the opposite level, one bit each.
     step_inverted: u8,
+    /// Axes whose drives are enabled by the opposite level, one bit each.
     enable_inverted: u8,
 }
 

@@ -30,11 +30,13 @@ pub(super) enum Planning {
 #[derive(Debug)]
 pub(super) struct Control {
     pub(super) run: RunRecord,
+    /// In lockstep: periods that may still pass.
     pub(super) credit: u32,
-    /// In lockstep: an instruction was executed in this tick; the last period with credit has ended, and its end is to be reported. Time
-    /// stands still for that tick, so that neither adds to the cycles of a period.
+    /// In lockstep: an instruction was executed in this tick. Time stands still for that tick, so that the instruction does not add to the cycles of a period.
     pub(super) obeyed: bool,
+    /// In lockstep: the last period with credit has ended, and that is to be reported in the next tick, in which time stands still likewise.
     pub(super) spent: bool,
+    /// Cycles that a tick may take while the tool moves on a free clock.
     pub(super) tick_budget: u32,
     /// Halts reported, or lost, since power-up.
     pub(super) halts: u32,

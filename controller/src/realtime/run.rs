@@ -7,10 +7,15 @@ use protocol::{digest::Digest, message::PassDigest};
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RunRecord {
     pub(super) samples: u32,
+    /// Digest of all samples.
     pub(super) digest: Digest,
+    /// The present pass; its digest and interval are filled in at its end.
     pub(super) pass: PassDigest,
+    /// Ticks missed.
     pub(super) deadline_misses: u32,
+    /// Most cycles of a tick.
     pub(super) tick_cycles_max: u32,
+    /// Events for which the queue had no room.
     pub(super) events_lost: u32,
     /// Periods in which the run waited for the words of a streamed job.
     pub(super) starved: u32,

@@ -7,7 +7,7 @@
 //! **After a job without limits** the axes' position is unknown: no links led from pass to pass.
 
 use interp_core::{RunStart, command::Command};
-use protocol::message::{Activity, InputLines, MotionStatus, Reason};
+use protocol::message::{InputLines, Reason};
 
 use super::{RealTime, run::RunRecord};
 use crate::{
@@ -70,12 +70,6 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
             Order::Drives { .. } | Order::Configure(_) | Order::Acknowledge => {}
         }
         Ok(())
-    }
-
-    /// The position that the host declared as home, nm; none where the machine is not homed.
-    #[must_use]
-    pub const fn home_nm(&self) -> Option<[i32; 3]> {
-        self.control.safety.home_nm()
     }
 
     /// Whether a run may start.
@@ -182,25 +176,6 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
                 self.interpolator.stand_at(Some(at_nm));
                 self.control.from_home = true;
             }
-        }
-    }
-
-    /// The axes outside a job.
-    #[must_use]
-    pub fn motion(&self) -> MotionStatus {
-        let motion = self.control.manual.status();
-        let stands_nm = self.interpolator.stands_nm();
-        MotionStatus {
-            activity: if self.spins_up() {
-                Activity::SpinUp
-            } else {
-                motion.activity
-            },
-            // After a run, or a declaration, its position.
-            at_nm: stands_nm
-                .filter(|_| !self.control.manual.is_active())
-                .unwrap_or(motion.at_nm),
-            ..motion
         }
     }
 

@@ -20,7 +20,9 @@ const BUTTON_PERIODS: u32 = 20;
 /// The start button. It acts when it is pressed after it was seen released, so one that is stuck, or shorted, never starts anything.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Button {
+    /// Time of the last look, periods since power-up.
     looked: u32,
+    /// It was released at the last look.
     was_released: bool,
     /// It has started the run that is under way, and no host was heard since.
     pub(super) runs_alone: bool,
@@ -186,7 +188,7 @@ impl Session {
         Ok(journal.ok_or(Reason::NothingToResume)?.start())
     }
 
-    /// The start button resumes a run that is held, and else starts the job that was stored last. Whatever hinders a host's start hinders this one.
+    /// The start button resumes a run that is held, and else starts the job that was stored last, under the same conditions as a start by the host.
     #[inline(never)]
     pub(crate) fn watch_button(&mut self, now: u32, machine: &mut impl Machine) {
         if !self.button.is_due(now) {
@@ -195,7 +197,7 @@ impl Session {
         let status = machine.status();
         self.button.runs_alone &= status.state.is_under_way();
         if self.button.runs_alone {
-            // Nobody is missed.
+            // A run that the button has started needs no host.
             machine.heard();
         }
         if !self.button.look(now, status.safety.lines.has(InputLines::START)) {
@@ -206,7 +208,7 @@ impl Session {
             _ if machine.motion().activity != Activity::Rest => Err(Reason::Moving),
             _ => self.start_job(machine, None, false),
         };
-        // A refusal has nobody to be told to; a host that is there reads the state.
+        // A refusal is not reported: there may be no host, and one that is there reads the state.
         self.button.runs_alone |= done.is_ok();
     }
 }
@@ -236,7 +238,7 @@ fn each_chunk<M: Machine>(
     }
 }
 
-/// Keeps a job no longer.
+/// Deletes the kept job of this name.
 #[inline(never)]
 pub(super) fn delete_job(machine: &mut impl Machine, name: &JobName) -> Result<(), Reason> {
     no_run(machine)?;

@@ -18,7 +18,7 @@ impl Session {
         }
     }
 
-    /// The places of the last run are none of the next job's. No record is prepared from here on, so that other records may be written.
+    /// Forgets the places of the last run, before another job is loaded. No record is prepared from here on, so that other records may be written.
     pub(super) fn forget_places(&mut self, machine: &mut impl Machine) {
         self.journalling.forget_places();
         machine.prepare_journal(None);
@@ -42,7 +42,7 @@ impl Session {
             .note(self.journal(at_start(pass.pass.saturating_add(1)), false));
     }
 
-    /// A run has come to its end, or to that of its ticks.
+    /// A run has ended, or its ticks are used up.
     pub(crate) fn note_halt(&mut self, status: &Status) {
         if status.state == State::Finished {
             self.journalling.note(self.journal(at_start(status.pass), true));
@@ -54,7 +54,7 @@ impl Session {
         }
     }
 
-    /// Journals what is due, and keeps the record of a failing supply up to date.
+    /// Writes the record that is due, and keeps the one for a failing supply up to date.
     #[inline(never)]
     pub(crate) fn keep_journal(&mut self, now: u32, machine: &mut impl Machine) {
         let due = self.journalling.due(now);

@@ -1,4 +1,4 @@
-//! What the board keeps and puts in force: profile, offsets, settings of the drives.
+//! Settings that the board keeps and puts in force: profile, offsets, settings of the drives.
 
 use interp_core::{
     fault::{Fault, FaultKind},
@@ -41,7 +41,7 @@ impl Session {
         self.enforce_profile(machine)
     }
 
-    /// Keeps other work offsets. The job loaded was placed by those before.
+    /// Keeps other work offsets. The loaded job was placed by the earlier ones, so it is outdated.
     #[inline(never)]
     pub(super) fn set_offsets(
         &mut self,
@@ -72,7 +72,7 @@ fn supervise(machine: &mut impl Machine) -> Result<u32, Reason> {
     Ok(digest)
 }
 
-/// What the kept profile says of supervision, and its digest. A function of its own, because a profile on the stack is 200 bytes.
+/// The supervision of the kept profile, and the profile's digest. A function of its own, because a profile on the stack is 200 bytes.
 #[inline(never)]
 fn supervision(machine: &mut impl Machine) -> (Configuration, u32) {
     match machine.profile() {
@@ -87,7 +87,7 @@ pub(super) fn has_spindle(machine: &mut impl Machine) -> bool {
     machine.profile().is_some_and(|profile| profile.spindle.is_some())
 }
 
-/// Puts what the kept profile says of motion outside a job in force.
+/// Puts the kept profile's part for motion outside a job in force.
 fn set_up(machine: &mut impl Machine) -> Result<(), Reason> {
     let setup = setup_of(machine);
     machine.order(Order::SetUp(setup))
@@ -119,7 +119,7 @@ pub(super) fn has_other_steps(machine: &mut impl Machine, settings: StepSettings
     machine.profile().is_some_and(|profile| profile.steps != settings)
 }
 
-/// A job may want a machine to be homed that need not be, but not the other way round.
+/// A job may require homing where the profile does not, but may not waive it where the profile requires it.
 pub(super) fn configure(machine: &mut impl Machine, configuration: Configuration) -> Result<(), Reason> {
     let must_home = machine
         .profile()

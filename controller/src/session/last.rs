@@ -13,9 +13,13 @@ const ANSWER_MAX: usize = 201;
 /// The last answered request, with its answer for a retransmission.
 #[derive(Debug)]
 pub(super) struct Last {
+    /// Number of the request.
     pub(super) number: u16,
+    /// Bytes of its payload.
     pub(super) length: usize,
+    /// CRC of its frame.
     pub(super) crc: u32,
+    /// The frame of its answer; empty before the first request.
     pub(super) answer: Vec<u8, ANSWER_MAX>,
 }
 

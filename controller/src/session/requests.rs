@@ -13,13 +13,13 @@ use super::{
 };
 use crate::{
     machine::{Busy, Instruction, Machine},
-    manual::Motion,
+    manual::{Motion, ProbeMove},
     safety::{Order, may_resume},
     upload::Upload,
 };
 
 impl Session {
-    /// Executes a request.
+    /// Answers a question, or executes a request.
     #[inline(never)]
     pub(super) fn answer(
         &mut self,
@@ -28,44 +28,55 @@ impl Session {
         machine: &mut impl Machine,
         out: &mut impl FnMut(&[u8]),
     ) -> Reply {
-        let done = match *request {
-            Request::Status => {
-                return Reply::Status {
-                    number,
-                    status: self.complete_with_steps(machine),
-                };
-            }
-            Request::Profile => {
-                return Reply::Profile {
-                    number,
-                    profile: machine.profile(),
-                };
-            }
-            Request::Motion => {
-                return Reply::Motion {
-                    number,
-                    motion: machine.motion(),
-                };
-            }
-            Request::Journal => {
-                return Reply::Journal {
-                    number,
-                    journal: machine.journal(),
-                };
-            }
-            Request::Offsets => {
-                return Reply::Offsets {
-                    number,
-                    offsets: machine.offsets(),
-                };
-            }
-            Request::StoredJob { index } => return stored_job(number, index, machine),
-            _ if needs_rest(request) && machine.motion().activity != Activity::Rest => Err(Reason::Moving),
+        match *request {
+            Request::Status => Reply::Status {
+                number,
+                status: self.complete_with_steps(machine),
+            },
+            Request::Profile => Reply::Profile {
+                number,
+                profile: machine.profile(),
+            },
+            Request::Motion => Reply::Motion {
+                number,
+                motion: machine.motion(),
+            },
+            Request::Journal => Reply::Journal {
+                number,
+                journal: machine.journal(),
+            },
+            Request::Offsets => Reply::Offsets {
+                number,
+                offsets: machine.offsets(),
+            },
+            Request::StoredJob { index } => stored_job(number, index, machine),
+            _ => match self.execute(request, machine, out) {
+                Ok(()) => Reply::Ack { number },
+                Err(reason) => Reply::Nak { number, reason },
+            },
+        }
+    }
+
+    /// Executes a request that is no question.
+    ///
+    /// # Errors
+    /// The reason of the refusal.
+    #[inline(never)]
+    fn execute(
+        &mut self,
+        request: &Request,
+        machine: &mut impl Machine,
+        out: &mut impl FnMut(&[u8]),
+    ) -> Result<(), Reason> {
+        if needs_rest(request) && machine.motion().activity != Activity::Rest {
+            return Err(Reason::Moving);
+        }
+        match *request {
             Request::SetProfile(ref profile) => self.set_profile(machine, profile.as_ref()),
             Request::SetOffsets(ref offsets) => self.set_offsets(machine, offsets),
             Request::Jog { way, speed_mm_s } => machine.order(Order::Move(Motion::Jog { way, speed_mm_s })),
             Request::Probe { axis, nm, speed_mm_s } => {
-                machine.order(Order::Move(Motion::Probe { axis, nm, speed_mm_s }))
+                machine.order(Order::Move(Motion::Probe(ProbeMove { axis, nm, speed_mm_s })))
             }
             Request::Spindle(order) => self.order_spindle(machine, order),
             Request::Turn { turning, rpm } => machine.order(Order::Turn { turning, rpm }),
@@ -118,12 +129,14 @@ impl Session {
             Request::Repeat { .. } => Err(Reason::EventGone {
                 first: self.events.first(),
             }),
-            // Answered by the caller.
-            Request::Hello { .. } => Err(Reason::Unreadable),
-        };
-        match done {
-            Ok(()) => Reply::Ack { number },
-            Err(reason) => Reply::Nak { number, reason },
+            // Answered by the callers.
+            Request::Hello { .. }
+            | Request::Status
+            | Request::Profile
+            | Request::Motion
+            | Request::Journal
+            | Request::Offsets
+            | Request::StoredJob { .. } => Err(Reason::Unreadable),
         }
     }
 
