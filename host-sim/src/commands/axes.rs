@@ -8,7 +8,7 @@ use serde_json::json;
 
 use super::home::{self, PositionNm};
 use super::out::say;
-use super::{Failure, Result, interrupt, run};
+use super::{Failure, Result, interrupt, numbers, run};
 use job::AXES;
 use machine::remote::Session;
 use machine::remote::axes;
@@ -110,7 +110,7 @@ pub(super) enum Action {
         #[arg(long, value_name = "N", value_parser = work_number())]
         work: Option<u8>,
         /// Speed, mm/s; the profile's velocity bounds it.
-        #[arg(long, default_value_t = JOG_MM_S)]
+        #[arg(long, default_value_t = JOG_MM_S, value_parser = numbers::speed, allow_negative_numbers = true)]
         speed: f32,
     },
     /// Probes along an axis, fast and then slowly, and sets a work offset by the place: touch z-30 --work 1 --plate 15 --radius 3.
@@ -122,16 +122,16 @@ pub(super) enum Action {
         #[arg(long, value_name = "N", value_parser = work_number())]
         work: u8,
         /// Work coordinate of the touched face, mm.
-        #[arg(long, default_value_t = 0.0, allow_hyphen_values = true)]
+        #[arg(long, default_value_t = 0.0, value_parser = numbers::coordinate, allow_hyphen_values = true)]
         at: f64,
         /// Thickness of a plate or block between face and tool, mm.
-        #[arg(long, default_value_t = 0.0)]
+        #[arg(long, default_value_t = 0.0, value_parser = numbers::thickness, allow_negative_numbers = true)]
         plate: f64,
         /// Radius of the tool's ball, mm: positions are its centre's.
-        #[arg(long, default_value_t = 0.0)]
+        #[arg(long, default_value_t = 0.0, value_parser = numbers::thickness, allow_negative_numbers = true)]
         radius: f64,
         /// Speed of the first move, mm/s.
-        #[arg(long, default_value_t = PROBE_MM_S)]
+        #[arg(long, default_value_t = PROBE_MM_S, value_parser = numbers::speed, allow_negative_numbers = true)]
         speed: f32,
     },
     /// Sets a work offset so that the axes stand at these work coordinates: zero xy --work 1.
@@ -143,7 +143,7 @@ pub(super) enum Action {
         #[arg(long, value_name = "N", value_parser = work_number())]
         work: u8,
         /// Work coordinate of where they stand, mm.
-        #[arg(long, default_value_t = 0.0, allow_hyphen_values = true)]
+        #[arg(long, default_value_t = 0.0, value_parser = numbers::coordinate, allow_hyphen_values = true)]
         at: f64,
     },
     /// Measures the tool's length on a tool setter below it: tool z-60 (the reference tool), later tool z-60 --setter Z.
@@ -152,10 +152,10 @@ pub(super) enum Action {
         #[arg(value_parser = distance, allow_hyphen_values = true)]
         by: Distance,
         /// Where the reference tool tripped, mm: printed when it was measured. Without: this is the reference tool.
-        #[arg(long, allow_hyphen_values = true)]
+        #[arg(long, value_parser = numbers::coordinate, allow_hyphen_values = true)]
         setter: Option<f64>,
         /// Speed of the first move, mm/s.
-        #[arg(long, default_value_t = PROBE_MM_S)]
+        #[arg(long, default_value_t = PROBE_MM_S, value_parser = numbers::speed, allow_negative_numbers = true)]
         speed: f32,
     },
     /// Declares where an axis without a switch stands, in machine coordinates, once the others are homed: place z=0.
@@ -279,85 +279,107 @@ pub(super) fn command(action: &Action, port: &str, as_json: bool) -> Result<()> 
             radius,
             speed,
         } => {
-            let tripped = touched(session, *by, *speed)?;
             // The face is on the far side of plate and ball.
             let beyond = if by.nm < 0 {
                 plate + radius
             } else {
                 -(plate + radius)
             };
-            let face = nm_of(at + beyond)?;
-            let mut offsets = session.offsets()?;
-            let mut machine_nm = tripped;
-            if by.axis == 2 {
-                machine_nm = machine_nm.wrapping_sub(offsets.tool_nm);
-            }
-            set(&mut offsets, *work, by.axis, machine_nm.wrapping_sub(face));
-            session.command(&Request::SetOffsets(offsets))?;
+            touch(session, *by, *work, nm_of(at + beyond)?, *speed)?;
         }
-        Action::Zero { axes, work, at } => {
-            must_be_homed(session)?;
-            let at = nm_of(*at)?;
-            let stands = session.motion()?.at_nm;
-            let mut offsets = session.offsets()?;
-            for (axis, nm) in (0_u8..).zip(stands) {
-                if axes >> axis & 1 != 0 {
-                    let tool = if axis == 2 { offsets.tool_nm } else { 0 };
-                    set(&mut offsets, *work, axis, nm.wrapping_sub(tool).wrapping_sub(at));
-                }
-            }
-            session.command(&Request::SetOffsets(offsets))?;
-        }
+        Action::Zero { axes, work, at } => zero(session, *axes, *work, nm_of(*at)?)?,
         Action::Tool { by, setter, speed } => {
-            let tripped = touched(session, *by, *speed)?;
-            let mut offsets = session.offsets()?;
-            offsets.tool_nm = match setter {
-                Some(setter) => tripped.wrapping_sub(nm_of(*setter)?),
-                None => 0,
-            };
-            session.command(&Request::SetOffsets(offsets))?;
+            let setter_nm = setter.map(nm_of).transpose()?;
+            let tripped = measure_tool(session, *by, setter_nm, *speed)?;
             if setter.is_none() && !as_json {
                 let mm = f64::from(tripped) / NM_PER_MM;
                 say!("this is the reference tool; for every other one: tool .. --setter {mm:.6}");
             }
         }
-        Action::Place { at } => {
-            let motion = session.motion()?;
-            let others = unknown(&motion) & !(1 << at.axis);
-            if others != 0 {
-                return Err(Failure::Failed(Some(format!(
-                    "{} is not homed\n  help: home first, then declare {}; or declare all three: operate home X,Y,Z",
-                    letters(others),
-                    letters(1 << at.axis),
-                ))));
-            }
-            let mut home_nm = motion.at_nm;
-            if let Some(place) = home_nm.get_mut(usize::from(at.axis)) {
-                *place = at.nm;
-            }
-            session.command(&Request::SetHome { home_nm })?;
-        }
+        Action::Place { at } => place(session, *at)?,
         Action::Offsets => {}
     }
-    let (motion, offsets) = (session.motion()?, session.offsets()?);
+    print_offsets(&session.motion()?, &session.offsets()?, as_json);
+    Ok(())
+}
+
+/// Position of the axes, work offsets and tool length.
+fn print_offsets(motion: &MotionStatus, offsets: &Offsets, as_json: bool) {
+    let mm = |nm: i32| f64::from(nm) / NM_PER_MM;
     if as_json {
-        let mm = |nm: i32| f64::from(nm) / NM_PER_MM;
         say!(
             "{}",
             json!({
-                "axes": json_of(&motion),
+                "axes": json_of(motion),
                 "work_mm": offsets.work_nm.map(|origin| origin.map(mm)),
                 "tool_mm": mm(offsets.tool_nm),
             })
         );
-        return Ok(());
+        return;
     }
     say!("axes at {} mm", PositionNm(motion.at_nm).words());
     for (number, origin) in (1..).zip(offsets.work_nm) {
         say!("  work offset {number}: {} mm", PositionNm(origin).words());
     }
-    say!("  tool length: {:.6} mm", f64::from(offsets.tool_nm) / NM_PER_MM);
+    say!("  tool length: {:.6} mm", mm(offsets.tool_nm));
+}
+
+/// Probes a face, and sets a work offset in which the tool's ball stands at this coordinate, nm, where it touches.
+fn touch(session: &mut Session, by: Distance, work: u8, face_nm: i32, speed: f32) -> Result<()> {
+    let tripped = touched(session, by, speed)?;
+    let mut offsets = session.offsets()?;
+    let machine_nm = tripped.wrapping_sub(tool_nm(&offsets, by.axis));
+    set(&mut offsets, work, by.axis, machine_nm.wrapping_sub(face_nm));
+    session.command(&Request::SetOffsets(offsets))?;
     Ok(())
+}
+
+/// Sets a work offset so that these axes (bits) stand at this coordinate, nm.
+fn zero(session: &mut Session, axes: u8, work: u8, at_nm: i32) -> Result<()> {
+    must_be_homed(session)?;
+    let stands = session.motion()?.at_nm;
+    let mut offsets = session.offsets()?;
+    for (axis, nm) in (0_u8..).zip(stands) {
+        if axes >> axis & 1 != 0 {
+            let machine_nm = nm.wrapping_sub(tool_nm(&offsets, axis));
+            set(&mut offsets, work, axis, machine_nm.wrapping_sub(at_nm));
+        }
+    }
+    session.command(&Request::SetOffsets(offsets))?;
+    Ok(())
+}
+
+/// Measures the tool's length against where the reference tool tripped, nm; without that it is the reference tool. Returns where it tripped, nm.
+fn measure_tool(session: &mut Session, by: Distance, setter_nm: Option<i32>, speed: f32) -> Result<i32> {
+    let tripped = touched(session, by, speed)?;
+    let mut offsets = session.offsets()?;
+    offsets.tool_nm = setter_nm.map_or(0, |setter| tripped.wrapping_sub(setter));
+    session.command(&Request::SetOffsets(offsets))?;
+    Ok(tripped)
+}
+
+/// Declares where an axis stands, once the others are homed.
+fn place(session: &mut Session, at: Distance) -> Result<()> {
+    let motion = session.motion()?;
+    let others = unknown(&motion) & !(1 << at.axis);
+    if others != 0 {
+        return Err(Failure::Failed(Some(format!(
+            "{} is not homed\n  help: home first, then declare {}; or declare all three: operate home X,Y,Z",
+            letters(others),
+            letters(1 << at.axis),
+        ))));
+    }
+    let mut home_nm = motion.at_nm;
+    if let Some(place) = home_nm.get_mut(usize::from(at.axis)) {
+        *place = at.nm;
+    }
+    session.command(&Request::SetHome { home_nm })?;
+    Ok(())
+}
+
+/// The tool length as it counts for an axis, nm.
+fn tool_nm(offsets: &Offsets, axis: u8) -> i32 {
+    if axis == 2 { offsets.tool_nm } else { 0 }
 }
 
 fn set(offsets: &mut Offsets, work: u8, axis: u8, nm: i32) {

@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use serde_json::json;
 
 use super::out::say;
-use super::{Failure, Result, along, load, progress, spinner, whole};
+use super::{Failure, Result, along, load, numbers, progress, spinner, whole};
 use approach::export::{Dialect, ExportError, Options, export};
 use approach::gcode::FeedMode;
 use approach::{Kind, passes};
@@ -37,10 +37,10 @@ pub(super) struct Arguments {
     #[arg(long, value_enum, default_value = "g94")]
     feed_mode: FeedMode,
     /// Clearance, mm: of the safe height above the highest cut, and of the start of a plunge above its cut.
-    #[arg(long, value_name = "MM", default_value_t = 5.0, allow_negative_numbers = true)]
+    #[arg(long, value_name = "MM", default_value_t = 5.0, value_parser = numbers::length, allow_negative_numbers = true)]
     clearance: f64,
     /// Switches the spindle on at this speed, rev/min.
-    #[arg(long, value_name = "RPM", allow_negative_numbers = true)]
+    #[arg(long, value_name = "RPM", value_parser = numbers::rpm, allow_negative_numbers = true)]
     spindle: Option<f64>,
     /// Prints one JSON object instead of text.
     #[arg(long)]
@@ -72,21 +72,7 @@ impl From<ExportError> for Failure {
     }
 }
 
-fn positive(value: f64, option: &str) -> Result<()> {
-    if value > 0.0 && value.is_finite() {
-        return Ok(());
-    }
-    Err(Failure::input(
-        format!("{option} {value} is not above 0"),
-        format!("give {option} a number above 0"),
-    ))
-}
-
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
-    positive(arguments.clearance, "--clearance")?;
-    arguments
-        .spindle
-        .map_or(Ok(()), |rpm| positive(rpm, "--spindle"))?;
     let (job, _) = load(&arguments.job)?;
     super::whole_surface(&job)?;
     whole::check(&arguments.output, arguments.force)?;

@@ -20,6 +20,7 @@ mod link_words;
 mod log;
 mod motion_words;
 mod new;
+mod numbers;
 mod operate;
 mod out;
 mod outcome;

@@ -6,7 +6,7 @@ use protocol::message::{OVERRIDE_MAX_PERCENT, Request, Status};
 use serde_json::json;
 
 use super::out::{say, to_stderr};
-use super::{Failure, Result, attach, axes, home, run, spindle, stored};
+use super::{Failure, Result, attach, axes, home, numbers, run, spindle, stored};
 use machine::remote::operate::{act, sentences};
 
 /// Switches a board's drives, homes and jogs its axes, touches off, holds, resumes or stops its run, follows it, and prints its state.
@@ -82,7 +82,7 @@ enum OperatorCommand {
         #[arg(value_parser = axes::distance, num_args = 0..=3)]
         by: Vec<axes::Distance>,
         /// Speed along the line, mm/s; the profile's velocities bound it.
-        #[arg(long, default_value_t = axes::JOG_MM_S)]
+        #[arg(long, default_value_t = axes::JOG_MM_S, value_parser = numbers::speed, allow_negative_numbers = true)]
         speed: f32,
     },
     /// Turns the spindle outside a run, for as long as this command runs: spindle 12000, spindle off.
@@ -99,7 +99,7 @@ enum OperatorCommand {
         #[arg(value_parser = axes::distance, allow_hyphen_values = true)]
         by: axes::Distance,
         /// Speed, mm/s.
-        #[arg(long, default_value_t = axes::PROBE_MM_S)]
+        #[arg(long, default_value_t = axes::PROBE_MM_S, value_parser = numbers::speed, allow_negative_numbers = true)]
         speed: f32,
     },
     /// Acknowledges a released emergency stop or drive fault.
@@ -308,8 +308,16 @@ mod tests {
             "jog w+1",
             "jog x+1e9",
             "jog x+1 x+2",
+            "jog x+1 --speed nan",
+            "jog x+1 --speed inf",
+            "jog x+1 --speed 0",
+            "jog x+1 --speed -3",
+            "probe z-1 --speed nan",
+            "probe z-1 --speed 0",
             "spindle fast",
             "spindle -1",
+            "spindle 1000 --for 1e20",
+            "spindle 1000 --for nan",
             "coolant 1",
         ] {
             assert!(

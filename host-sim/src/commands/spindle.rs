@@ -1,7 +1,6 @@
 //! `operate spindle` and `operate coolant` outside a run: on for as long as the command runs, because the board switches off when it does not hear the host for a second.
 
-use std::io::{BufRead, stdin};
-use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::sync::mpsc::RecvTimeoutError;
 use std::time::{Duration, Instant};
 
 use clap::Args;
@@ -10,7 +9,8 @@ use serde_json::json;
 
 use super::operate::{json_of as status_json, typed};
 use super::out::{say, to_stderr};
-use super::{Failure, Result, axes, interrupt};
+use super::typed::lines;
+use super::{Failure, Result, axes, interrupt, numbers};
 use machine::remote::operate::{act, spindle_words};
 use machine::remote::{RemoteError, Session};
 
@@ -27,7 +27,7 @@ pub(super) struct Turn {
     #[arg(long)]
     ccw: bool,
     /// Switches off after this time, s. Default: with this command's end, or the line `off`.
-    #[arg(long = "for", value_name = "SECONDS", value_parser = seconds)]
+    #[arg(long = "for", value_name = "SECONDS", value_parser = numbers::seconds, allow_negative_numbers = true)]
     pub(super) seconds: Option<f64>,
 }
 
@@ -51,13 +51,6 @@ fn rpm(text: &str) -> std::result::Result<u32, String> {
             .parse()
             .map_err(|_| "expected turns a minute, such as 12000, or off".to_owned()),
     }
-}
-
-fn seconds(text: &str) -> std::result::Result<f64, String> {
-    text.parse()
-        .ok()
-        .filter(|seconds: &f64| *seconds > 0.0 && seconds.is_finite())
-        .ok_or_else(|| "expected a time in seconds, such as 60".to_owned())
 }
 
 /// `on` or `off`.
@@ -101,15 +94,7 @@ pub(super) fn keep(session: &mut Session, seconds: Option<f64>, as_json: bool) -
         }
     }
     let end = seconds.map(|seconds| Instant::now() + Duration::from_secs_f64(seconds));
-    let (sender, lines) = channel();
-    // The thread ends with standard input or with the process.
-    std::thread::spawn(move || {
-        for line in stdin().lock().lines().map_while(std::result::Result::ok) {
-            if sender.send(line).is_err() {
-                break;
-            }
-        }
-    });
+    let lines = lines();
     interrupt::watch("Ctrl-C switches it off");
     while !interrupt::is_asked() && end.is_none_or(|end| Instant::now() < end) {
         match lines.recv_timeout(LOOK) {
@@ -185,11 +170,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn speeds_times_and_switches_are_read() {
+    fn speeds_and_switches_are_read() {
         assert_eq!((rpm("12000"), rpm("off")), (Ok(12_000), Ok(0)));
         assert!(rpm("fast").is_err() && rpm("-1").is_err() && rpm("1.5").is_err());
-        assert_eq!(seconds("0.5"), Ok(0.5));
-        assert!(seconds("0").is_err() && seconds("inf").is_err() && seconds("x").is_err());
         assert_eq!((switch("on"), switch("off")), (Ok(true), Ok(false)));
         assert!(switch("1").is_err());
     }

@@ -14,6 +14,19 @@ use machine::remote::operate::Operator;
 /// The commands, for the prompt.
 pub(super) const WORDS: &str = "hold, pause, resume, stop, abort, override 50, coolant off, status";
 
+/// The lines of standard input, read in a thread, which ends with standard input or with the process.
+pub(super) fn lines() -> Receiver<String> {
+    let (sender, lines) = channel();
+    std::thread::spawn(move || {
+        for line in stdin().lock().lines().map_while(Result::ok) {
+            if sender.send(line).is_err() {
+                break;
+            }
+        }
+    });
+    lines
+}
+
 /// The operator at the terminal: reads lines from standard input, prints the answers above the progress bar.
 pub(super) struct Console {
     lines: Receiver<String>,
@@ -25,19 +38,10 @@ pub(super) struct Console {
 }
 
 impl Console {
-    /// Starts to read standard input in a thread.
+    /// Starts to read standard input.
     pub(super) fn new(bar: ProgressBar, has_limits: Option<bool>) -> Self {
-        let (sender, lines) = channel();
-        // The thread ends with standard input or with the process.
-        std::thread::spawn(move || {
-            for line in stdin().lock().lines().map_while(Result::ok) {
-                if sender.send(line).is_err() {
-                    break;
-                }
-            }
-        });
         Self {
-            lines,
+            lines: lines(),
             open: true,
             bar,
             has_limits,

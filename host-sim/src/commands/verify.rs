@@ -18,8 +18,8 @@ use super::out::{complain, say};
 use super::part_words::{Centres, PartProof};
 use super::simulate::{WantedReport, remarks, report, timed};
 use super::{
-    Bar, Failure, Result, along, error_json, home, motion_words, part_words, reach_words, read_profile,
-    swept_words,
+    Bar, Failure, Result, along, error_json, home, motion_words, numbers, part_words, reach_words,
+    read_profile, swept_words,
 };
 
 /// Checks a job before it runs on a machine. Every sample against an independent f64 oracle: positions, normals, feed ripple, path
@@ -27,9 +27,9 @@ use super::{
 /// axis limits: the share of each limit that the samples use, and the duration of the first, middle and last pass against the
 /// optimum. Least concave radius, machining time, size of the surface data.
 ///
-/// Example: cargo sim verify jobs/plate.toml
 /// Several jobs are verified one after the other; the JSON object then has the list `jobs`, with an error for one that cannot be read.
 ///
+/// Example: cargo sim verify jobs/plate.toml
 /// Example: cargo sim verify jobs/plate_machine.toml --report out
 /// Example: cargo sim verify jobs/plate.toml jobs/torus.toml --scallop-tolerance 1% --json
 #[derive(Debug, Args)]
@@ -53,23 +53,11 @@ pub(super) struct Arguments {
     #[arg(long)]
     optimum: bool,
     /// Accepts scallops this much above the limit: in percent, or as a share (1% or 0.01).
-    #[arg(long, value_name = "SHARE", value_parser = share, default_value = "0%")]
+    #[arg(long, value_name = "SHARE", value_parser = numbers::share, default_value = "0%")]
     scallop_tolerance: f64,
     /// Prints one JSON object instead of text.
     #[arg(long)]
     pub(super) json: bool,
-}
-
-/// A share: `1%` or `0.01`, from 0 to 100 %.
-fn share(text: &str) -> std::result::Result<f64, String> {
-    let text = text.trim();
-    let (number, unit) = text
-        .strip_suffix('%')
-        .map_or((text, 1.0), |number| (number, 0.01));
-    match number.trim().parse::<f64>() {
-        Ok(number) if (0.0..=1.0).contains(&(number * unit)) => Ok(number * unit),
-        _ => Err("give a share from 0 to 100 %, e.g. 1% or 0.01".to_owned()),
-    }
 }
 
 /// A figure with the bound that applies to it.
@@ -442,21 +430,5 @@ mod tests {
     fn each_face_of_a_part_has_a_folder() {
         assert_eq!(folder_of(Path::new("a/part.toml#34")), "part-34");
         assert_eq!(folder_of(Path::new("a/plate.v2.toml")), "plate.v2");
-    }
-
-    #[test]
-    fn shares_are_percents_or_numbers() {
-        for (text, exact) in [
-            ("1%", 0.01),
-            ("0.5 %", 0.005),
-            ("0.01", 0.01),
-            ("0", 0.0),
-            ("100%", 1.0),
-        ] {
-            assert!((share(text).unwrap() - exact).abs() < 1e-15, "{text}");
-        }
-        for text in ["", "%", "-1%", "101%", "nan", "inf", "1 percent", "2"] {
-            assert!(share(text).is_err(), "{text}");
-        }
     }
 }

@@ -27,7 +27,63 @@ fn nonsense_gets_a_remedy() {
         ),
         (
             "export job.toml --format linuxcnc --clearance -3 -o x",
-            &["--clearance -3 is not above 0", "help:"],
+            &["'-3' for '--clearance <MM>'", "a length in mm above 0"],
+        ),
+        (
+            "export job.toml --format linuxcnc --spindle inf -o x",
+            &["'inf' for '--spindle <RPM>'", "turns a minute above 0"],
+        ),
+        (
+            "judge job.toml motion.csv --path-tolerance nan",
+            &["'nan' for '--path-tolerance <MM>'", "a length in mm above 0"],
+        ),
+        (
+            "judge job.toml motion.csv --path-tolerance 0",
+            &["'0' for '--path-tolerance <MM>'"],
+        ),
+        (
+            "verify job.toml --scallop-tolerance nan",
+            &["'nan' for '--scallop-tolerance <SHARE>'", "0 to 100 %"],
+        ),
+        (
+            "operate --port nowhere jog x+1 --speed nan",
+            &["'nan' for '--speed <SPEED>'", "a speed in mm/s above 0"],
+        ),
+        (
+            "operate --port nowhere probe z-1 --speed -1",
+            &["'-1' for '--speed <SPEED>'"],
+        ),
+        (
+            "operate --port nowhere goto 0,0,0 --speed inf",
+            &["'inf' for '--speed <SPEED>'"],
+        ),
+        (
+            "operate --port nowhere touch z-1 --work 1 --speed 0",
+            &["'0' for '--speed <SPEED>'"],
+        ),
+        (
+            "operate --port nowhere touch z-1 --work 1 --plate -1",
+            &["'-1' for '--plate <PLATE>'", "from 0 to 2147"],
+        ),
+        (
+            "operate --port nowhere touch z-1 --work 1 --radius nan",
+            &["'nan' for '--radius <RADIUS>'"],
+        ),
+        (
+            "operate --port nowhere zero x --work 1 --at nan",
+            &["'nan' for '--at <AT>'"],
+        ),
+        (
+            "operate --port nowhere tool z-1 --speed nan",
+            &["'nan' for '--speed <SPEED>'"],
+        ),
+        (
+            "operate --port nowhere tool z-1 --setter 9999",
+            &["'9999' for '--setter <SETTER>'", "within 2147 of 0"],
+        ),
+        (
+            "operate --port nowhere spindle 9000 --for 1e20",
+            &["'1e20' for '--for <SECONDS>'", "at most 86400"],
         ),
         ("export job.toml --format heidenhain -o x", &["linuxcnc, grbl"]),
         ("budget --ticks 0", &["0 is not in 1.."]),
