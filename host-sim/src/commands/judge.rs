@@ -4,21 +4,25 @@ use std::path::PathBuf;
 
 use clap::Args;
 use glam::DVec3;
+use inspect::FaultAt;
 use job::Job;
-use oracle::{AccuracyReport, Oracle, PassSample, SampleCheck};
+use machine::Machine;
+use machine::prepare::Prepared;
+use oracle::{AccuracyReport, PassSample, SampleCheck};
 use report::{Figure, Mark, Remarks, RidgePoint, Scallops, Sketch};
 use serde_json::{Value, json};
 use verify::Verdict;
-use verify::judge::{Judged, judge};
-use verify::motion::limits::{ORDERS, failures};
+use verify::judge::{Judged, SCALLOP_SLACK, judge};
+use verify::motion::limits::ORDERS;
 use verify::reach::ReachFinding;
 use verify::speeds::SpeedFigures;
 use verify::survey::{SampleObserver, SurveyResult};
 use verify::swept::{FieldPoint, Progress};
 
 use super::out::say;
+use super::outcome::fault_json;
 use super::simulate::{WantedReport, report};
-use super::{Bar, Failure, Result, load, reach_words};
+use super::{Bar, Failure, Result, load, numbers, reach_words};
 use crate::motion::{self, MotionError};
 
 /// Largest path error that is accepted, as a share of the scallop limit, unless `--path-tolerance` gives it.
@@ -44,7 +48,7 @@ pub(super) struct Arguments {
     #[arg(long)]
     tip: bool,
     /// Accepts centres this far from the exact offset surface, mm; default a tenth of the scallop limit.
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_name = "MM", value_parser = numbers::length, allow_negative_numbers = true)]
     path_tolerance: Option<f64>,
     /// Judges the motion alone, without a run of the core.
     #[arg(long)]
@@ -60,57 +64,18 @@ pub(super) struct Arguments {
     pub(super) json: bool,
 }
 
+impl Arguments {
+    /// Largest path error that is accepted, mm.
+    fn path_tolerance_mm(&self, job: &Job) -> f64 {
+        self.path_tolerance.unwrap_or(PATH_SHARE * job.scallop_mm)
+    }
+}
+
 impl From<MotionError> for Failure {
     fn from(error: MotionError) -> Self {
         Self::input(error.what, error.remedy)
     }
 }
-
-/// Reasons against a motion.
-fn reasons(job: &Job, judged: &Judged, path_tolerance_mm: f64) -> Vec<String> {
-    let mut reasons = Vec::new();
-    if judged.in_contact == 0 {
-        return vec!["the motion never touches the surface: is it in the job's coordinates? --tip if it is of the ball's tip".to_owned()];
-    }
-    let error = &judged.path_error_mm;
-    if error.value.abs() > path_tolerance_mm {
-        reasons.push(format!(
-            "the centre is {:+.6} mm off the exact offset surface at sample {}, u = {:.6}, v = {:.6}; {path_tolerance_mm} mm is accepted",
-            error.value, error.sample, error.uv[0], error.uv[1]
-        ));
-    }
-    let highest = judged.highest();
-    if judged.field.uncut_share > 0.0 {
-        reasons.push(format!(
-            "no ball reaches {:.3} % of the surface",
-            100.0 * judged.field.uncut_share
-        ));
-    } else if highest.height_mm > job.scallop_mm * (1.0 + SCALLOP_SLACK) {
-        reasons.push(format!(
-            "the scallop is {:.6} mm high, {:.2} % above the limit of {} mm, at u = {:.6}, v = {:.6}",
-            highest.height_mm,
-            100.0 * (highest.height_mm / job.scallop_mm - 1.0),
-            job.scallop_mm,
-            highest.uv[0],
-            highest.uv[1]
-        ));
-    }
-    if judged.gouge_mm() > path_tolerance_mm {
-        let lowest = &judged.field.lowest;
-        reasons.push(format!(
-            "the ball cuts {:.6} mm below the surface at u = {:.6}, v = {:.6}; {path_tolerance_mm} mm is accepted",
-            judged.gouge_mm(),
-            lowest.uv[0],
-            lowest.uv[1]
-        ));
-    }
-    reasons.extend(judged.reach.failures.iter().cloned());
-    reasons.extend(failures(&judged.axes));
-    reasons
-}
-
-/// Excess of the searched height that is accepted: the search's own error.
-const SCALLOP_SLACK: f64 = 1e-3;
 
 fn object(job: &Job, judged: &Judged) -> Value {
     let [velocity, acceleration, jerk] = &judged.axes;
@@ -234,17 +199,32 @@ fn print(theirs: &Judged, ours: Option<&Judged>) {
     }
 }
 
-/// The core's own run of the job, as positions.
-fn own_run(job: &Job, prepared: &machine::prepare::Prepared) -> Result<Vec<DVec3>> {
+/// The core's own run of the job, as positions, mm; with the fault that has ended it before its end.
+fn own_run(job: &Job, prepared: &Prepared) -> Result<(Vec<DVec3>, Option<FaultAt>)> {
     let mut centres = Vec::new();
-    let mut machine = machine::Machine::load(prepared).map_err(|fault| inspect::load_error(job, fault))?;
+    let mut machine = Machine::load(prepared).map_err(|fault| inspect::load_error(job, fault))?;
     let ran = machine.run(|sample| {
         centres.push(DVec3::from(sample.cl_nm.map(f64::from)) * 1e-6);
         true
     });
-    // A fault ends the run; what was emitted is judged.
-    let _ = ran;
-    Ok(centres)
+    let fault = ran.err();
+    let fault = fault.map(|fault| FaultAt::of(fault, &machine, centres.len() as u64, prepared));
+    Ok((centres, fault))
+}
+
+/// The core's own run, judged.
+struct OwnRun {
+    judged: Judged,
+    /// The fault that has ended it before its end: its figures are those of a part of the job.
+    fault: Option<FaultAt>,
+}
+
+/// That the core's figures are those of a part of the job, and why.
+fn partial(fault: &FaultAt) -> String {
+    format!(
+        "this core stopped before the end of the job: {}",
+        fault.sentence()
+    )
 }
 
 /// Samples of a motion in contact, with what was found for each.
@@ -256,7 +236,7 @@ fn page(
     wanted: Option<WantedReport<'_>>,
     job: &Job,
     samples: &Samples,
-    (judged, ours): (&Judged, Option<&Judged>),
+    (judged, own): (&Judged, Option<&OwnRun>),
     failures: &[String],
 ) -> Result<Option<PathBuf>> {
     if wanted.is_none() {
@@ -272,7 +252,7 @@ fn page(
         .unwrap_or(arguments.motion.as_os_str());
     let figures = rows().into_iter().map(|(name, unit, figure)| {
         let given = format!("{:.6}", figure(judged));
-        let own = ours.map_or_else(String::new, |ours| format!(" | {:.6}", figure(ours)));
+        let own = own.map_or_else(String::new, |own| format!(" | {:.6}", figure(&own.judged)));
         Figure {
             what: format!("{name}, {unit}"),
             value: format!("{given}{own}"),
@@ -288,23 +268,26 @@ fn page(
         (number, line.iter().map(place).collect())
     };
     let mut marks = reach_words::marks(job, &judged.reach);
-    let lowest = &judged.field.lowest;
-    if judged.gouge_mm() > arguments.path_tolerance.unwrap_or(PATH_SHARE * job.scallop_mm) {
+    let mut mark = |what, at: &FieldPoint| {
         marks.push(Mark {
-            what: format!("gouge {:.4} mm", judged.gouge_mm()),
-            place_mm: lowest.point_mm,
+            what,
+            place_mm: at.point_mm,
             tick: None,
         });
+    };
+    if let Some(lowest) = judged.violating_gouge(arguments.path_tolerance_mm(job)) {
+        mark(format!("gouge {:.4} mm", judged.gouge_mm()), lowest);
     }
-    if judged.highest().height_mm > job.scallop_mm * (1.0 + SCALLOP_SLACK) {
-        marks.push(Mark {
-            what: format!("scallop {:.5} mm", judged.highest().height_mm),
-            place_mm: judged.highest().point_mm,
-            tick: None,
-        });
+    if let Some(highest) = judged.violating_scallop(job) {
+        mark(format!("scallop {:.5} mm", highest.height_mm), highest);
     }
     let remarks = Remarks {
         failures: failures.to_vec(),
+        warnings: own
+            .and_then(|own| own.fault.as_ref())
+            .map(partial)
+            .into_iter()
+            .collect(),
         verified: true,
         figures: figures.collect(),
         scallops: Some(Scallops {
@@ -345,8 +328,7 @@ fn survey(judged: &Judged) -> SurveyResult {
 
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let (own_job, prepared) = load(&arguments.job)?;
-    let oracle = Oracle::new(&own_job)
-        .map_err(|error| Failure::input(error.to_string(), "set side = \"+\" or \"-\""))?;
+    let oracle = inspect::oracle(&own_job)?;
     let wanted = WantedReport::new(arguments.report.as_deref(), arguments.force)?;
     let given = motion::read(&arguments.motion, &own_job, arguments.tip)?;
     // The motion's own period, for its speeds; everything else is the job's.
@@ -358,36 +340,29 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let mut keep = |sample: &PassSample, check: &SampleCheck| samples.push((*sample, *check));
     let each = wanted.map(|_| &mut keep as &mut SampleObserver<'_>);
     let theirs = judge(&job, &oracle, &given.centres_mm, each, progress);
-    let ours = if arguments.alone {
+    let own = if arguments.alone {
         None
     } else {
-        Some(judge(
-            &own_job,
-            &oracle,
-            &own_run(&own_job, &prepared)?,
-            None,
-            progress,
-        ))
+        let (centres_mm, fault) = own_run(&own_job, &prepared)?;
+        let judged = judge(&own_job, &oracle, &centres_mm, None, progress);
+        Some(OwnRun { judged, fault })
     };
     bar.clear();
-    let reasons = reasons(
-        &job,
-        &theirs,
-        arguments.path_tolerance.unwrap_or(PATH_SHARE * job.scallop_mm),
-    );
+    let core_fault = own.as_ref().and_then(|own| own.fault.as_ref());
+    let failures = theirs.failures(&job, arguments.path_tolerance_mm(&job));
     let page = page(
         arguments,
         wanted,
         &job,
         &samples,
-        (&theirs, ours.as_ref()),
-        &reasons,
+        (&theirs, own.as_ref()),
+        &failures,
     )?;
     if arguments.json {
         let value = json!({
             "job": arguments.job.display().to_string(), "motion": arguments.motion.display().to_string(), "period_s": given.period_s,
-            "given": object(&job, &theirs), "core": ours.as_ref().map(|ours| object(&own_job, ours)),
-            "failures": reasons, "passed": reasons.is_empty(),
+            "given": object(&job, &theirs), "core": own.as_ref().map(|own| object(&own_job, &own.judged)),
+            "core_fault": core_fault.map(fault_json), "failures": failures, "passed": failures.is_empty(),
         });
         say!("{value}");
     } else {
@@ -399,17 +374,20 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
             theirs.in_contact,
             theirs.field.points
         );
-        print(&theirs, ours.as_ref());
+        print(&theirs, own.as_ref().map(|own| &own.judged));
+        if let Some(fault) = core_fault {
+            say!("  {}", partial(fault));
+        }
         reach_words::print(&job, &theirs.reach);
-        for reason in &reasons {
-            say!("  FAIL {reason}");
+        for failure in &failures {
+            say!("  FAIL {failure}");
         }
         if let Some(page) = page {
             say!("  report {}", page.display());
         }
-        say!("  {}", if reasons.is_empty() { "passed" } else { "FAILED" });
+        say!("  {}", if failures.is_empty() { "passed" } else { "FAILED" });
     }
-    if reasons.is_empty() {
+    if failures.is_empty() {
         Ok(())
     } else {
         Err(Failure::Failed(None))

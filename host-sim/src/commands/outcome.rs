@@ -13,7 +13,7 @@ use verify::speeds::SpeedRange;
 use verify::survey::SurveyResult;
 
 /// A fault with its position, as JSON.
-fn fault_json(at: &FaultAt) -> Value {
+pub(super) fn fault_json(at: &FaultAt) -> Value {
     let (message, remedy) = explain::fault(at.fault);
     let [u, v] = at.parameters;
     json!({

@@ -22,6 +22,7 @@ fn judge_takes_samples_and_agrees_with_verify() {
     let number = |value: &Value| value.as_f64().unwrap();
     assert_eq!(told["passed"], true, "{told}");
     assert_eq!(told["given"], told["core"], "the same motion");
+    assert_eq!(told["core_fault"], Value::Null);
     let [theirs, ours] = [&told["given"], &verified].map(|of| number(&of["scallop_max_mm"]));
     assert!((theirs / ours - 1.0).abs() < 2e-3, "{theirs} and {ours}");
     assert!(number(&told["given"]["path_error_max_mm"]) < 10e-6, "{told}");
@@ -42,7 +43,7 @@ fn judge_takes_samples_and_agrees_with_verify() {
         (number(&told["given"]["path_error_max_mm"]) - 0.004).abs() < 5e-5,
         "{told}"
     );
-    assert!(told["core"].is_null());
+    assert!(told["core"].is_null() && told["core_fault"].is_null());
     for (text, wanted) in [
         ("t_s,x,y,z\n0,1,2,3\n", ":1: the columns"),
         (
@@ -89,4 +90,68 @@ fn judge_takes_programs() {
     std::fs::write(folder.path().join("bad.ngc"), "G1 X1 Y2 F0 Q\n").unwrap();
     let refused = run(folder.path(), "judge job.toml bad.ngc --json");
     assert_eq!(refused.status.code(), Some(2), "{}", out(&refused));
+}
+
+/// A program in coordinates that are not the job's is refused, by the call and with the remedy; and so is one with a feed per revolution.
+#[test]
+fn judge_refuses_programs_with_offsets() {
+    let folder = folder_with("torus", &[]);
+    for (text, call, remedy) in [
+        (
+            "G21G94\nG10 L2 P1 X0 Y0 Z5\nG0X1Y1Z1\nG1X2F100\nM2\n",
+            "SET_G5X_OFFSET(1, 0.0000, 0.0000, 5.0000",
+            "G10 L2",
+        ),
+        ("G21G94\nG0X1Y1Z1\nN20 G92 X7\nG1X2F100\nM2\n", "block N20", "G92"),
+        (
+            "G21G94\nG43.1 Z5\nG0X1Y1Z1\nG1X2F100\nM2\n",
+            "USE_TOOL_LENGTH_OFFSET(0.0000 0.0000 5.0000",
+            "--tip",
+        ),
+        (
+            "G21G95S100M3\nG0X1Y1Z1\nG1X2F0.1\nM2\n",
+            "SET_FEED_MODE(0, 1)",
+            "G94",
+        ),
+        (
+            "G21G94F100\nG5.1 X10 Y10 I5 J1\nM2\n",
+            "NURBS_FEED(3, ...)",
+            "G1, G2, G3",
+        ),
+    ] {
+        std::fs::write(folder.path().join("posted.ngc"), text).unwrap();
+        let output = run(folder.path(), "judge job.toml posted.ngc --json");
+        assert_eq!(output.status.code(), Some(2), "{text}: {}", out(&output));
+        let told: Value = serde_json::from_slice(&output.stdout).unwrap();
+        let [message, help] = ["message", "help"].map(|key| told["error"][key].as_str().unwrap());
+        assert!(
+            message.contains(call) && help.contains(remedy),
+            "LinuxCNC's rs274 is needed, as scripts/setup.sh brings it: {told}"
+        );
+    }
+}
+
+/// The core's run ends with a fault: its column is that of a part of the job, and says so.
+#[test]
+fn judge_tells_of_a_fault_of_the_core() {
+    let folder = folder_with("torus", &[]);
+    std::fs::write(
+        folder.path().join("own.csv"),
+        "t_s,x_mm,y_mm,z_mm\n0,40,0,-3\n0.001,40,0.01,-3\n0.002,40,0.02,-3\n",
+    )
+    .unwrap();
+    let job = std::fs::read_to_string(folder.path().join("job.toml")).unwrap();
+    std::fs::write(
+        folder.path().join("job.toml"),
+        job.replacen("radius_mm = 5", "radius_mm = 9", 1),
+    )
+    .unwrap();
+    let output = run(folder.path(), "judge job.toml own.csv --json");
+    let told: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(told["core_fault"]["name"], "ball-does-not-fit", "{told}");
+    let text = out(&run(folder.path(), "judge job.toml own.csv"));
+    assert!(
+        text.contains("this core stopped before the end of the job: "),
+        "{text}"
+    );
 }

@@ -10,9 +10,11 @@
 //! The motion need not follow lines of the surface and has no parameters, so ridges are searched over the whole surface instead of pass by pass.
 
 mod closest;
+mod failures;
 mod stretches;
 
 pub use closest::{NearestPoint, Projector};
+pub use failures::SCALLOP_SLACK;
 
 use glam::DVec3;
 use job::Job;
@@ -127,7 +129,7 @@ pub fn judge(
     let mut path = ToolPath::default();
     let projector = Projector::new(oracle);
     let contact_mm = (CONTACT_SHARE * oracle.radius_mm).max(CONTACT_MIN_MM);
-    let mut state = Contacts::new(job.feed_mm_s());
+    let mut state = Contacts::new(job.feed_mm_s(), period_s);
     let mut last: Option<NearestPoint> = None;
     let mut motion = Motion::default();
     let mut stretches = Stretches::new(each, job, oracle.radius_mm);
@@ -141,15 +143,15 @@ pub fn judge(
         let touches = fits(&nearest) && on_side(oracle, &nearest, *centre_mm);
         let mut jumps = false;
         if touches {
-            jumps = state.add(oracle, index, &nearest, last.as_ref(), *centre_mm, period_s);
-            path.add_centre(cl_nm, last.is_none() || jumps);
-            stretches.add(
+            let sample = Sample {
                 index,
-                &nearest,
-                *centre_mm,
-                last.is_none() || jumps,
-                state.step_mm,
-            );
+                nearest,
+                centre_mm: *centre_mm,
+            };
+            jumps = state.add(oracle, &sample, last.as_ref());
+            let first = last.is_none() || jumps;
+            path.add_centre(cl_nm, first);
+            stretches.add(&sample, first, state.step_mm);
         } else {
             state.leave();
         }
@@ -192,9 +194,19 @@ struct Around {
     stretches: u32,
 }
 
+/// A sample in contact.
+struct Sample {
+    /// From 0.
+    index: usize,
+    /// Its contact.
+    nearest: NearestPoint,
+    centre_mm: DVec3,
+}
+
 /// Sums over the samples in contact.
 struct Contacts {
     feed_mm_s: f64,
+    period_s: f64,
     /// Length of the last step, mm; `None` after a jump and at the first sample of a stretch.
     step_mm: Option<f64>,
     length_mm: f64,
@@ -212,9 +224,10 @@ struct Contacts {
 }
 
 impl Contacts {
-    fn new(feed_mm_s: f64) -> Self {
+    fn new(feed_mm_s: f64, period_s: f64) -> Self {
         Self {
             feed_mm_s,
+            period_s,
             step_mm: None,
             length_mm: 0.0,
             count: 0,
@@ -232,38 +245,31 @@ impl Contacts {
         }
     }
 
-    /// Adds a sample in contact; returns whether the motion jumps to it.
-    fn add(
-        &mut self,
-        oracle: &Oracle,
-        sample: usize,
-        nearest: &NearestPoint,
-        before: Option<&NearestPoint>,
-        centre_mm: DVec3,
-        period_s: f64,
-    ) -> bool {
+    /// Adds a sample in contact; `before`: the contact of the sample before it. Returns whether the motion jumps to it.
+    fn add(&mut self, oracle: &Oracle, sample: &Sample, before: Option<&NearestPoint>) -> bool {
+        let Sample {
+            index,
+            nearest,
+            centre_mm,
+        } = sample;
         self.count += 1;
-        let uv = nearest.uv;
-        self.stretch.push(MotionPoint {
-            sample,
-            uv,
-            value: nearest.distance_mm - oracle.radius_mm,
-        });
+        let point = |value| MotionPoint {
+            sample: *index,
+            uv: nearest.uv,
+            value,
+        };
+        self.stretch.push(point(nearest.distance_mm - oracle.radius_mm));
         let up = (centre_mm - nearest.point_mm).z / nearest.distance_mm.max(f64::MIN_POSITIVE);
         self.above += usize::from(up < 0.0);
         if up < self.steepest.value {
-            self.steepest = MotionPoint {
-                sample,
-                uv,
-                value: up,
-            };
+            self.steepest = point(up);
         }
         self.step_mm = None;
         let Some(before) = before else {
             return false;
         };
         let step_mm = arc_mm(oracle, before, nearest);
-        let speed = step_mm / period_s;
+        let speed = step_mm / self.period_s;
         let jumps = speed > JUMP_STEPS * self.feed_mm_s;
         if !jumps {
             self.step_mm = Some(step_mm);

@@ -4,7 +4,7 @@ use glam::DVec3;
 use job::Job;
 use oracle::{PassSample, SampleCheck};
 
-use super::closest::NearestPoint;
+use super::Sample;
 use crate::reach::{ContactPlace, ContactSide};
 use crate::survey::SampleObserver;
 
@@ -41,15 +41,13 @@ impl<'a, 'b> Stretches<'a, 'b> {
         }
     }
 
-    /// A sample in contact; `step_mm`: the contact's way from the sample before.
-    pub(super) fn add(
-        &mut self,
-        sample: usize,
-        nearest: &NearestPoint,
-        centre_mm: DVec3,
-        first: bool,
-        step_mm: Option<f64>,
-    ) {
+    /// A sample in contact; `first`: of its stretch; `step_mm`: the contact's way from the sample before.
+    pub(super) fn add(&mut self, sample: &Sample, first: bool, step_mm: Option<f64>) {
+        let Sample {
+            index: sample,
+            nearest,
+            centre_mm,
+        } = *sample;
         self.emit(first);
         self.count += u32::from(first);
         let [u, v] = nearest.uv;

@@ -1,0 +1,69 @@
+//! What a motion breaks: the one place that decides it.
+
+use job::Job;
+
+use super::Judged;
+use crate::motion::limits;
+use crate::swept::FieldPoint;
+
+/// Excess of the searched height over the scallop limit that is accepted, as a share of the limit: the search's own error.
+pub const SCALLOP_SLACK: f64 = 1e-3;
+
+impl Judged {
+    /// The lowest place, if a ball cuts more than the tolerance, mm, below the surface there.
+    #[must_use]
+    pub fn violating_gouge(&self, path_tolerance_mm: f64) -> Option<&FieldPoint> {
+        (self.gouge_mm() > path_tolerance_mm).then_some(&self.field.lowest)
+    }
+
+    /// The highest place, if its scallop is above the job's limit. None where a ball does not reach all of the surface: that is a failure of its own.
+    #[must_use]
+    pub fn violating_scallop(&self, job: &Job) -> Option<&FieldPoint> {
+        let is_high = self.highest().height_mm > job.scallop_mm * (1.0 + SCALLOP_SLACK);
+        (is_high && self.field.uncut_share <= 0.0).then_some(self.highest())
+    }
+
+    /// One sentence for each requirement that the motion breaks: contact with the surface, path error and gouges within the tolerance (mm, finite,
+    /// above 0), scallops within the job's limit, the reach of the tool, the axis limits. Empty: it passes.
+    #[must_use]
+    pub fn failures(&self, job: &Job, path_tolerance_mm: f64) -> Vec<String> {
+        if self.in_contact == 0 {
+            return vec!["the motion never touches the surface: is it in the job's coordinates? --tip if it is of the ball's tip".to_owned()];
+        }
+        let mut failures = Vec::new();
+        let error = &self.path_error_mm;
+        if error.value.abs() > path_tolerance_mm {
+            failures.push(format!(
+                "the centre is {:+.6} mm off the exact offset surface at sample {}, u = {:.6}, v = {:.6}; {path_tolerance_mm} mm is accepted",
+                error.value, error.sample, error.uv[0], error.uv[1]
+            ));
+        }
+        if self.field.uncut_share > 0.0 {
+            failures.push(format!(
+                "no ball reaches {:.3} % of the surface",
+                100.0 * self.field.uncut_share
+            ));
+        }
+        failures.extend(self.violating_scallop(job).map(|highest| {
+            format!(
+                "the scallop is {:.6} mm high, {:.2} % above the limit of {} mm, at u = {:.6}, v = {:.6}",
+                highest.height_mm,
+                100.0 * (highest.height_mm / job.scallop_mm - 1.0),
+                job.scallop_mm,
+                highest.uv[0],
+                highest.uv[1]
+            )
+        }));
+        failures.extend(self.violating_gouge(path_tolerance_mm).map(|lowest| {
+            format!(
+                "the ball cuts {:.6} mm below the surface at u = {:.6}, v = {:.6}; {path_tolerance_mm} mm is accepted",
+                self.gouge_mm(),
+                lowest.uv[0],
+                lowest.uv[1]
+            )
+        }));
+        failures.extend(self.reach.failures.iter().cloned());
+        failures.extend(limits::failures(&self.axes));
+        failures
+    }
+}
