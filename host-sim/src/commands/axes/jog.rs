@@ -1,5 +1,7 @@
 //! Jogs: by distances, in a straight line of up to three axes, and by keys for as long as they are held.
 
+use std::sync::mpsc::RecvTimeoutError;
+
 use console::{Key, Term};
 use protocol::message::{InputLines, JogWay, MotionEnd, Profile, Request};
 
@@ -44,6 +46,23 @@ const fn direction_of(key: &Key) -> Option<[i8; 3]> {
     })
 }
 
+/// Whether a key ends the jog.
+const fn ends(key: &Key) -> bool {
+    matches!(key, Key::Escape | Key::Char('q' | 'Q') | Key::CtrlC)
+}
+
+/// What keys ask for that have waited while the board answered: the first of them that ends, else the last.
+fn wish(first: Key, later: impl Iterator<Item = Key>) -> Key {
+    let mut last = first;
+    for key in later {
+        if ends(&last) {
+            break;
+        }
+        last = key;
+    }
+    last
+}
+
 /// A share of the velocity of the slowest axis that moves.
 fn speed_of(signs: [i8; 3], velocity_mm_s: [f32; 3], share: f32) -> f32 {
     let moving = signs.iter().zip(velocity_mm_s).filter(|(sign, _)| **sign != 0);
@@ -80,17 +99,20 @@ pub(in super::super) fn by_keys(session: &mut Session) -> Result<()> {
     let mut lit = InputLines::NONE;
     loop {
         let first = keys.recv_timeout(std::time::Duration::from_millis(500));
-        // Keys that have waited while the board answered are one wish: the last.
-        let key = std::iter::once(first).chain(keys.try_iter().map(Ok)).last();
+        let key = match first {
+            Ok(first) => Some(wish(first, keys.try_iter())),
+            Err(RecvTimeoutError::Timeout) => None,
+            Err(RecvTimeoutError::Disconnected) => return Ok(()),
+        };
         match key {
-            Some(Ok(Key::Escape | Key::Char('q' | 'Q') | Key::CtrlC)) => {
+            Some(key) if ends(&key) => {
                 axes::stop(session)?;
                 to_stderr(format_args!(""));
                 return Ok(());
             }
-            Some(Ok(Key::Char('+'))) => share = (share + 1).min(SHARES.len() - 1),
-            Some(Ok(Key::Char('-'))) => share = share.saturating_sub(1),
-            Some(Ok(key)) => {
+            Some(Key::Char('+')) => share = (share + 1).min(SHARES.len() - 1),
+            Some(Key::Char('-')) => share = share.saturating_sub(1),
+            Some(key) => {
                 if let Some(signs) = direction_of(&key) {
                     let request = Request::Jog {
                         way: JogWay::Towards { signs },
@@ -101,8 +123,7 @@ pub(in super::super) fn by_keys(session: &mut Session) -> Result<()> {
                     }
                 }
             }
-            Some(Err(std::sync::mpsc::RecvTimeoutError::Disconnected)) => return Ok(()),
-            Some(Err(std::sync::mpsc::RecvTimeoutError::Timeout)) | None => {}
+            None => {}
         }
         let motion = session.motion()?;
         if motion.end == MotionEnd::LimitSwitch
@@ -136,6 +157,20 @@ mod tests {
         };
         assert_eq!(request, Ok(wanted));
         assert!(by(&[distance(0, 10), distance(0, 5)], 3.0).is_err());
+    }
+
+    #[test]
+    fn no_later_key_hides_one_that_ends() {
+        for end in [Key::Escape, Key::Char('q'), Key::Char('Q'), Key::CtrlC] {
+            let keys = [Key::ArrowLeft, end.clone(), Key::ArrowLeft, Key::Char('+')];
+            for from in 0..2 {
+                let later = keys[from + 1..].iter().cloned();
+                assert_eq!(wish(keys[from].clone(), later), end);
+            }
+            assert_eq!(wish(Key::ArrowUp, std::iter::once(end.clone())), end);
+        }
+        let later = [Key::Char('+'), Key::ArrowRight];
+        assert_eq!(wish(Key::ArrowLeft, later.into_iter()), Key::ArrowRight);
     }
 
     #[test]
