@@ -19,11 +19,12 @@ use super::out::say;
 use super::outcome::Outcome;
 use super::resume;
 use super::simulate::{WantedReport, remarks, report, surveyed, timed};
-use super::{Failure, Result, progress, read_profile, scripted, whole};
+use super::{Failure, Result, error_json, progress, read_profile, scripted, whole};
 use approach::Kind;
 use compare::{by_digest, by_sample};
 pub(super) use connect::open_port;
 use connect::{Connected, connect, models_failure};
+use inspect::FaultAt;
 use inspect::comparison::{BoardRun, Reference};
 use job::{HeartbeatAction, Job, MachineProfile};
 use machine::prepare::{self, Prepared};
@@ -235,24 +236,53 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let mut bench = bench(arguments)?;
     let (profile, origin, stands) = (bench.profile, bench.origin, bench.stands);
     let stops = chain::stops(&jobs, |path| home::load(path, profile.as_ref(), origin, stands))?;
-    let (mut values, mut failure) = (Vec::new(), None);
-    for (path, stop) in jobs.iter().zip(stops) {
-        let ran = run_job(arguments, (path, stop), several, &mut bench)?;
-        values.push(ran.value);
-        failure = ran.failure;
-        if failure.is_some() {
-            break;
-        }
-    }
-    if let Some((peer, _)) = &mut bench.connected {
-        failure = failure.or_else(|| models_failure(peer, arguments.json));
+    let (mut values, mut end) = run_all(&jobs, &stops, |path, stop| {
+        run_job(arguments, (path, stop), several, &mut bench)
+    });
+    if let (Ok(()), Some((peer, _))) = (&end, &mut bench.connected) {
+        end = passed_unless(models_failure(peer, arguments.json));
     }
     if several {
-        print_all(arguments, &jobs, &values, failure.is_none());
+        print_all(arguments, &jobs, &values, end.is_ok());
     } else if let (true, Some(value)) = (arguments.json, values.pop().filter(|value| !value.is_null())) {
         say!("{value}");
     }
+    end
+}
+
+/// Fails with this failure, if there is one.
+fn passed_unless(failure: Option<String>) -> Result<()> {
     failure.map_or(Ok(()), |failure| Err(Failure::Failed(Some(failure))))
+}
+
+/// Runs faces one after the other until one fails. Returns what came of those that ran, and the end; of several faces, a refused one has an object with
+/// its error.
+fn run_all(
+    jobs: &[PathBuf],
+    stops: &[Stop],
+    mut run: impl FnMut(&Path, Stop) -> Result<Ran>,
+) -> (Vec<Value>, Result<()>) {
+    let mut values = Vec::new();
+    for (path, stop) in jobs.iter().zip(stops) {
+        let end = match run(path, *stop) {
+            Ok(ran) => {
+                values.push(ran.value);
+                passed_unless(ran.failure)
+            }
+            Err(refused) => {
+                if jobs.len() > 1 {
+                    let mut value = error_json::of_failure(&refused).unwrap_or_default();
+                    value["job"] = path.display().to_string().into();
+                    values.push(value);
+                }
+                Err(refused)
+            }
+        };
+        if end.is_err() {
+            return (values, end);
+        }
+    }
+    (values, Ok(()))
 }
 
 /// All faces together.
@@ -264,7 +294,7 @@ fn print_all(arguments: &Arguments, jobs: &[PathBuf], values: &[Value], passed: 
     let sum = |key: &str| values.iter().filter_map(|value| value[key].as_f64()).sum::<f64>();
     say!(
         "{} of {} faces ran, {:.2} min, {} samples compared",
-        values.len(),
+        values.iter().filter(|value| value["error"].is_null()).count(),
         jobs.len(),
         sum("machining_time_s") / 60.0,
         sum("compared_samples")
@@ -284,9 +314,7 @@ fn run_job(
     several: bool,
     bench: &mut Bench,
 ) -> Result<Ran> {
-    let (profile, origin) = (bench.profile, bench.origin);
-    let has_run = std::mem::replace(&mut bench.has_run, true);
-    let (mut job, mut prepared) = home::load(path, profile.as_ref(), origin, bench.stands)?;
+    let (mut job, mut prepared) = home::load(path, bench.profile.as_ref(), bench.origin, bench.stands)?;
     stop.apply(&mut job, &mut prepared);
     if let (true, Some((_, session))) = (arguments.resume, &mut bench.connected) {
         prepared.start = resume::start(session, &prepared)?;
@@ -295,50 +323,18 @@ fn run_job(
     if let Some(name) = &arguments.store {
         return store(arguments, path, (&job, &prepared), name, bench);
     }
-    let folder = arguments.report.as_ref().map(|folder| match several {
-        true => folder.join(path.file_name().unwrap_or(path.as_os_str())),
-        false => folder.clone(),
-    });
-    arguments
-        .script
-        .iter()
-        .for_each(|script| whole::note_input(script));
-    if let Some(path) = &arguments.trace {
-        whole::check(path, arguments.force)?;
-    }
-    let directory = WantedReport::new(folder.as_deref(), arguments.force)?;
-    if arguments.fast && job.machine.heartbeat_action == HeartbeatAction::Hold {
-        return Err(Failure::input(
-            "the emulated chip's time runs faster than this computer can send heartbeats, and the job has host_gone = \"hold\"",
-            "omit --fast, or set host_gone = \"finish\"",
-        ));
-    }
+    let folder = report_folder(arguments, path, several);
+    let directory = wanted_outputs(arguments, &job, folder.as_deref())?;
     if let Some(script) = &arguments.script {
-        let scripted = scripted::play(&job, &prepared, script, None)?;
-        let session = session_of(arguments, bench)?;
-        check_period(&job, session)?;
-        make_ready(arguments, (&job, &prepared), has_run, session)?;
-        drive::upload(session, &prepared, |_| {})?;
-        scripted.run(&job, session, arguments.json)?;
-        return Ok(Ran {
-            value: Value::Null,
-            failure: None,
-        });
+        return run_script(arguments, (&job, &prepared), script, bench);
     }
     let here = timed(&job, &prepared)?;
-    if let Some(fault) = here
-        .fault
-        .as_ref()
-        .filter(|at| at.fault.kind == FaultKind::StepRate)
-    {
+    let is_step_rate = |at: &&FaultAt| at.fault.kind == FaultKind::StepRate;
+    if let Some(fault) = here.fault.as_ref().filter(is_step_rate) {
         return Err(Failure::Failed(Some(fault.sentence_of(&job))));
     }
-    let session = session_of(arguments, bench)?;
-    check_period(&job, session)?;
-    make_ready(arguments, (&job, &prepared), has_run, session)?;
-    let bar = progress(prepared.words.len() as u64, "uploading");
-    drive::upload(session, &prepared, |words| bar.set_position(words as u64))?;
-    bar.finish_and_clear();
+    let (profile, origin) = (bench.profile, bench.origin);
+    let session = loaded_board(arguments, (&job, &prepared), bench)?;
     order_spindle(&job, profile.as_ref(), session)?;
     let reference = Reference {
         job: &job,
@@ -374,25 +370,97 @@ fn run_job(
     }
     if !arguments.json {
         say!("{} on {board}", path.display());
-        if let (Some(number), Some(origin)) = (arguments.work, origin) {
-            say!(
-                "  origin       work offset {number}, at {} mm of the machine",
-                origin.words()
-            );
-        }
-        if arguments.resume {
-            say!("  resumed      {}", resume::words(prepared.start));
-        }
+        print_begin(arguments, &prepared, origin);
         outcome.print(page.as_deref());
-        let (speed, missed) = (run.ticks_per_second.round(), run.status.deadline_misses);
-        say!("  board        {speed} ticks per second, {missed} missed");
-        if arguments.target.port.is_none() && arguments.home.is_none() {
-            let position = home::of(&prepared).words();
-            say!("  home         declared at {position} mm: a simulated board has no axes");
-        }
-        print_line(&run);
+        print_board(arguments, &prepared, &run);
     }
     Ok(Ran { value, failure })
+}
+
+/// The folder of a face's report: of several faces one in that of the report.
+fn report_folder(arguments: &Arguments, path: &Path, several: bool) -> Option<PathBuf> {
+    arguments.report.as_ref().map(|folder| match several {
+        true => folder.join(path.file_name().unwrap_or(path.as_os_str())),
+        false => folder.clone(),
+    })
+}
+
+/// Checks before the run that its files can be written, and that the target can run the job.
+fn wanted_outputs<'a>(
+    arguments: &Arguments,
+    job: &Job,
+    folder: Option<&'a Path>,
+) -> Result<Option<WantedReport<'a>>> {
+    if let Some(script) = &arguments.script {
+        whole::note_input(script);
+    }
+    if let Some(path) = &arguments.trace {
+        whole::check(path, arguments.force)?;
+    }
+    let directory = WantedReport::new(folder, arguments.force)?;
+    if arguments.fast && job.machine.heartbeat_action == HeartbeatAction::Hold {
+        return Err(Failure::input(
+            "the emulated chip's time runs faster than this computer can send heartbeats, and the job has host_gone = \"hold\"",
+            "omit --fast, or set host_gone = \"finish\"",
+        ));
+    }
+    Ok(directory)
+}
+
+/// Runs the job with the operator commands of a script, in lockstep.
+fn run_script(
+    arguments: &Arguments,
+    (job, prepared): (&Job, &Prepared),
+    script: &Path,
+    bench: &mut Bench,
+) -> Result<Ran> {
+    let scripted = scripted::play(job, prepared, script, None)?;
+    let session = loaded_board(arguments, (job, prepared), bench)?;
+    scripted.run(job, session, arguments.json)?;
+    Ok(Ran {
+        value: Value::Null,
+        failure: None,
+    })
+}
+
+/// The board, made ready, with the job loaded.
+fn loaded_board<'b>(
+    arguments: &Arguments,
+    (job, prepared): (&Job, &Prepared),
+    bench: &'b mut Bench,
+) -> Result<&'b mut Session> {
+    let has_run = std::mem::replace(&mut bench.has_run, true);
+    let session = session_of(arguments, bench)?;
+    check_period(job, session)?;
+    make_ready(arguments, (job, prepared), has_run, session)?;
+    let bar = progress(prepared.words.len() as u64, "uploading");
+    drive::upload(session, prepared, |words| bar.set_position(words as u64))?;
+    bar.finish_and_clear();
+    Ok(session)
+}
+
+/// Where the job lies and begins, if it is not where its file says.
+fn print_begin(arguments: &Arguments, prepared: &Prepared, origin: Option<PositionNm>) {
+    if let (Some(number), Some(origin)) = (arguments.work, origin) {
+        say!(
+            "  origin       work offset {number}, at {} mm of the machine",
+            origin.words()
+        );
+    }
+    if arguments.resume {
+        say!("  resumed      {}", resume::words(prepared.start));
+    }
+}
+
+/// What the board and the line did, and the result of the comparison.
+fn print_board(arguments: &Arguments, prepared: &Prepared, run: &BoardRun) {
+    let (speed, missed) = (run.ticks_per_second.round(), run.status.deadline_misses);
+    say!("  board        {speed} ticks per second, {missed} missed");
+    if arguments.target.port.is_none() && arguments.home.is_none() {
+        let position = home::of(prepared).words();
+        say!("  home         declared at {position} mm: a simulated board has no axes");
+    }
+    print_line(run);
 }
 
 /// Stores the job on the board.
@@ -495,4 +563,37 @@ fn json_of(outcome: &Outcome<'_>, run: &BoardRun, board: &str) -> Value {
     put("samples_missing", json!(run.missing));
     put("board", json!(board));
     Value::Object(keys)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A later face that is refused ends the run, and keeps what came of the faces before it.
+    #[test]
+    fn faces_that_ran_are_kept() {
+        let jobs = ["a", "b", "c"].map(PathBuf::from);
+        let stops = [Stop::default(); 3];
+        let mut begun = Vec::new();
+        let (values, end) = run_all(&jobs, &stops, |path, _| {
+            begun.push(path.to_owned());
+            match path.to_str() {
+                Some("a") => Ok(Ran {
+                    value: json!({ "samples": 7 }),
+                    failure: None,
+                }),
+                _ => Err(Failure::input("beyond the travel", "move it")),
+            }
+        });
+        assert!(matches!(end, Err(Failure::Input(_))), "{end:?}");
+        assert_eq!(begun, jobs[..2]);
+        assert_eq!(values[0]["samples"], 7);
+        assert_eq!(
+            (&values[1]["job"], &values[1]["error"]["message"]),
+            (&"b".into(), &"beyond the travel".into())
+        );
+        // The error of a single job is the command's.
+        let (values, end) = run_all(&jobs[..1], &stops, |_, _| Err(Failure::Failed(None)));
+        assert!(values.is_empty() && end.is_err());
+    }
 }
