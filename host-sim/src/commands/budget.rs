@@ -314,22 +314,34 @@ fn report(arguments: &Arguments, counted: &[Counted]) -> Result<()> {
     Ok(())
 }
 
-/// Compares with the golden table, or writes it.
-fn hold(arguments: &Arguments, figures: &[Figure], counts: &[(String, Count)]) -> Result<()> {
+/// The text of the golden table.
+fn golden_table(path: &Path) -> Result<String> {
+    std::fs::read_to_string(path).map_err(|error| {
+        Failure::input(
+            format!("cannot read {}: {error}", path.display()),
+            "run it in a checkout of the project; cargo sim budget --bless writes the table anew",
+        )
+    })
+}
+
+/// Compares with the golden table, if it is given, or writes it.
+fn hold(
+    arguments: &Arguments,
+    table: Option<&str>,
+    figures: &[Figure],
+    counts: &[(String, Count)],
+) -> Result<()> {
     let operations: Vec<(String, Operations)> = counts
         .iter()
         .map(|(name, count)| (name.clone(), count.operations))
         .collect();
-    let path = golden::path();
     if arguments.bless {
+        let path = golden::path();
         return std::fs::write(&path, golden::table(figures, &operations))
             .map_err(|error| cannot_write(&path, &error));
     }
-    if !arguments.check {
-        return Ok(());
-    }
-    let table = std::fs::read_to_string(&path).map_err(|error| cannot_write(&path, &error))?;
-    let differences = golden::differences(&table, figures, &operations);
+    let Some(table) = table else { return Ok(()) };
+    let differences = golden::differences(table, figures, &operations);
     if differences.is_empty() {
         return Ok(());
     }
@@ -346,6 +358,10 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
             "run it in a checkout",
         ));
     }
+    let table = arguments
+        .check
+        .then(|| golden_table(&golden::path()))
+        .transpose()?;
     let bar = spinner("building the firmware");
     let image = qemu::firmware()?;
     bar.finish_and_clear();
@@ -384,5 +400,20 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         held.extend(golden::worst_ticks(&setup)?);
         bar.finish_and_clear();
     }
-    hold(arguments, &held, &counts)
+    hold(arguments, table.as_deref(), &held, &counts)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_missing_table_cannot_be_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let Err(Failure::Input(report)) = golden_table(&folder.path().join("cycles.txt")) else {
+            panic!("a table that is not there is read");
+        };
+        assert!(report.to_string().starts_with("cannot read "), "{report}");
+        assert!(report.help().unwrap().to_string().contains("--bless"));
+    }
 }
