@@ -210,75 +210,89 @@ fn spaced(text: &str, spacing: &str, start: Option<&str>) -> String {
     }
 }
 
-fn report(
-    arguments: &Arguments,
-    path: &Path,
-    face: &Face,
-    made: &MachinableFace,
-    written: &JobText,
-    reach: Option<&FaceReach>,
-    advice: Option<&SpacingAdvice>,
-) {
-    let size = written.measures.size_mm();
-    if arguments.json {
-        let value = json!({
+/// A job that was written, and what it was made from.
+struct Written<'a> {
+    path: &'a Path,
+    face: &'a Face,
+    made: &'a MachinableFace,
+    text: &'a JobText,
+    reach: Option<&'a FaceReach>,
+    advice: Option<&'a SpacingAdvice>,
+}
+
+impl Written<'_> {
+    /// How the face became a surface.
+    fn becomes(&self) -> &'static str {
+        if self.made.form == Form::Exact {
+            "exact"
+        } else {
+            "approximated"
+        }
+    }
+
+    fn json(&self) -> Value {
+        let Self {
+            path,
+            face,
+            made,
+            text,
+            ..
+        } = self;
+        json!({
             "job": path.display().to_string(),
             "face": face.number,
             "entity": face.entity,
             "kind": face.surface.kind(),
             "patches": made.patches,
             "rational": made.nurbs.rational,
-            "size_mm": size,
-            "least_concave_radius_mm": { "plus": written.measures.concave_mm[0], "minus": written.measures.concave_mm[1] },
-            "becomes": if made.form == Form::Exact { "exact" } else { "approximated" },
+            "size_mm": text.measures.size_mm(),
+            "least_concave_radius_mm": { "plus": text.measures.concave_mm[0], "minus": text.measures.concave_mm[1] },
+            "becomes": self.becomes(),
             "deviation": deviation_json(&made.form),
             "trimmed": made.trimmed.is_some(),
             "untrimmed": made.outline.trimmed.is_some() && made.trimmed.is_none(),
-            "radius_mm": written.radius_mm,
-            "side": written.side,
-            "warnings": written.warnings,
-            "region": reach.map(region_words::json),
-            "spacing": advice.map(advice_json),
-        });
-        say!("{value}");
-        return;
+            "radius_mm": text.radius_mm,
+            "side": text.side,
+            "warnings": text.warnings,
+            "region": self.reach.map(region_words::json),
+            "spacing": self.advice.map(advice_json),
+        })
     }
-    say!("{}", path.display());
-    say!(
-        "  face         {} ({}, {})",
-        face.number,
-        face.entity,
-        face.surface.kind()
-    );
-    say!(
-        "  size         {:.3} x {:.3} x {:.3} mm",
-        size[0],
-        size[1],
-        size[2]
-    );
-    let exact = if made.form == Form::Exact {
-        "exact"
-    } else {
-        "approximated"
-    };
-    say!("  surface      {} patches, {exact}", made.patches);
-    say!(
-        "  tool         ball of radius {} mm, side \"{}\"",
-        written.radius_mm,
-        written.side
-    );
-    if let Some(advice) = advice {
-        say!("  passes       {}", advice.sentence());
-    }
-    if let Some(reach) = reach {
-        for line in region_words::lines(reach) {
+
+    fn print(&self) {
+        let Self {
+            path,
+            face,
+            made,
+            text,
+            ..
+        } = self;
+        let [x, y, z] = text.measures.size_mm();
+        say!("{}", path.display());
+        say!(
+            "  face         {} ({}, {})",
+            face.number,
+            face.entity,
+            face.surface.kind()
+        );
+        say!("  size         {x:.3} x {y:.3} x {z:.3} mm");
+        say!("  surface      {} patches, {}", made.patches, self.becomes());
+        say!(
+            "  tool         ball of radius {} mm, side \"{}\"",
+            text.radius_mm,
+            text.side
+        );
+        if let Some(advice) = self.advice {
+            say!("  passes       {}", advice.sentence());
+        }
+        for line in self.reach.iter().flat_map(|reach| region_words::lines(reach)) {
             say!("  reach        {line}");
         }
+        for warning in &text.warnings {
+            say!("  note         {warning}");
+        }
+        say!("  next         cargo sim verify {}", path.display());
     }
-    for warning in &written.warnings {
-        say!("  note         {warning}");
-    }
-    say!("  next         cargo sim verify {}", path.display());
 }
 
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
@@ -353,14 +367,18 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         job_file::parse_with(&name, &written.text, &part::Faces)?;
     }
     whole::write(path, written.text.as_bytes(), arguments.force)?;
-    report(
-        arguments,
+    let written = Written {
         path,
         face,
-        &made,
-        &written,
-        job.origin.reach(),
-        advice.as_ref(),
-    );
+        made: &made,
+        text: &written,
+        reach: job.origin.reach(),
+        advice: advice.as_ref(),
+    };
+    if arguments.json {
+        say!("{}", written.json());
+    } else {
+        written.print();
+    }
     Ok(())
 }
