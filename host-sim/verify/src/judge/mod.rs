@@ -462,6 +462,34 @@ mod tests {
         assert!(uncut > 0.3 && uncut < 0.5, "{uncut}");
     }
 
+    /// Sentence and place of a failure are of one decision; of a surface that no ball reaches in part, the height there is none of its own.
+    #[test]
+    fn failures_are_decided_once() {
+        let (job, oracle) = torus(0.05);
+        let deep = judge(&job, &oracle, &passes(12, -0.004, 0.0), None, &());
+        let says = |judged: &Judged, tolerance_mm, words: &str| {
+            let failures = judged.failures(&job, tolerance_mm);
+            failures.iter().any(|failure| failure.contains(words))
+        };
+        for (tolerance_mm, fails) in [(0.0035, true), (0.0045, false)] {
+            assert_eq!(says(&deep, tolerance_mm, "below the surface"), fails);
+            assert_eq!(says(&deep, tolerance_mm, "off the exact offset surface"), fails);
+            assert_eq!(deep.violating_gouge(tolerance_mm).is_some(), fails);
+        }
+        // Five passes leave more than the limit of 0.05 mm.
+        let coarse = judge(&job, &oracle, &passes(5, 0.0, 0.0), None, &());
+        assert!(says(&coarse, 0.01, "the scallop is") && coarse.violating_scallop(&job).is_some());
+        let half: Vec<DVec3> = passes(12, 0.0, 0.0)
+            .into_iter()
+            .filter(|centre| centre.y > centre.x)
+            .collect();
+        let uncut = judge(&job, &oracle, &half, None, &());
+        assert!(says(&uncut, 0.01, "no ball reaches") && !says(&uncut, 0.01, "the scallop is"));
+        assert_eq!(uncut.violating_scallop(&job), None);
+        let away = judge(&job, &oracle, &[DVec3::Z * 100.0; 3], None, &());
+        assert!(says(&away, 0.01, "never touches the surface"));
+    }
+
     /// A plunge, a way along the groove and a retract: the way alone has an error.
     #[test]
     fn coming_and_leaving_are_no_errors() {
