@@ -14,8 +14,9 @@ const RADII_MM: [f64; 13] = [0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0,
 const FIT: f64 = 0.8;
 /// Default feed, mm/min.
 pub const FEED_MM_MIN: f64 = 1200.0;
-/// Default scallop height, mm.
+/// Default scallop height, mm, and the largest as a share of the ball's radius.
 const SCALLOP_MM: f64 = 0.01;
+const SCALLOP_SHARE: f64 = 0.1;
 /// Least z of the mean normal of a surface that faces up.
 const UP: f64 = 0.1;
 /// A surface that reaches farther than this from the origin is placed with its centre there, mm: the machine's range is 2147 mm either way, and
@@ -33,6 +34,12 @@ const NO_LIMITS: &str = "# A machine's axis limits, or its profile (--machine FI
      # jerk_max_mm_s3 = [20000, 20000, 10000]\n";
 /// Digits of a written coordinate: full precision of f64.
 const COLUMN: usize = 100;
+
+/// Scallop height limit of a job that is given none, mm, for a ball of this radius, mm.
+#[must_use]
+pub fn default_scallop_mm(radius_mm: f64) -> f64 {
+    SCALLOP_MM.min(SCALLOP_SHARE * radius_mm)
+}
 
 /// Options of the job; `None`: chosen automatically.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -306,7 +313,9 @@ fn text(
          [machine]\n\
          period_us = 1000            # sampling period\n{}",
         options.feed_mm_min.unwrap_or(FEED_MM_MIN),
-        options.scallop_mm.unwrap_or(SCALLOP_MM.min(0.1 * radius_mm)),
+        options
+            .scallop_mm
+            .unwrap_or_else(|| default_scallop_mm(radius_mm)),
         quoted(&or(&options.along, "u")),
         quoted(side),
         quoted(&or(

@@ -46,7 +46,7 @@ pub use error::CadError;
 pub use faces::{Original, machinable_once, model_with, surface_of};
 pub use fit::Deviation;
 pub use interpolation::interpolation_error_mm;
-pub use job::{FEED_MM_MIN, JobOptions, JobText, LIMITS, machined_sign, write_job};
+pub use job::{FEED_MM_MIN, JobOptions, JobText, LIMITS, default_scallop_mm, machined_sign, write_job};
 pub use machinable::{Form, MachinableFace, Options, degrees, machinable};
 pub use measure::{Measures, measure};
 pub use outline::{Outline, outline};

@@ -24,7 +24,7 @@ use pieces::{Pieces, Polygon};
 /// Time of a link that crosses something, apart from its length, s: up, across and down within the default limits.
 const LINK_S: f64 = 0.5;
 /// Time of a pass apart from its length, s.
-const PASS_S: f64 = 0.15;
+pub const PASS_S: f64 = 0.15;
 /// More arcs are merged by the number of crossings alone.
 const INTERVALS_MAX: usize = CROSSINGS_MAX / 2;
 

@@ -17,4 +17,5 @@ pub mod script;
 pub mod travel;
 pub mod work;
 
+pub use cells::PASS_S;
 pub use in_process::Machine;

@@ -27,8 +27,6 @@ pub(super) use setup::Up;
 use setup::{Setup, best_side};
 use summary::{Sums, print, summary};
 
-/// Default scallop height, mm, as in a job of a face.
-const SCALLOP_MM: f64 = 0.01;
 /// How far the surface of a face goes on beyond it, in step-overs: as for a job.
 const STEP_OVERS_AROUND: f64 = job_file::STEP_OVERS_AROUND;
 
@@ -83,6 +81,20 @@ impl<'a> Output<'a> {
     }
 }
 
+/// The scallop height limit, mm, and how the faces become surfaces.
+fn options(arguments: &Arguments, radius_mm: f64) -> (f64, Options) {
+    let scallop_mm = arguments
+        .scallop_mm
+        .unwrap_or_else(|| cad::default_scallop_mm(radius_mm));
+    let options = Options {
+        tolerance_mm: arguments.tolerance,
+        untrimmed: false,
+        parameters: FaceParameters::Edges,
+        around_mm: STEP_OVERS_AROUND * job::plane_step_over_mm(radius_mm, scallop_mm),
+    };
+    (scallop_mm, options)
+}
+
 /// Writes a job for each face, the summary and the page.
 ///
 /// # Errors
@@ -95,13 +107,7 @@ pub(super) fn command(arguments: &Arguments, file: &str, model: &Arc<Model>, out
             "give the ball's radius in mm with --tool R",
         ));
     };
-    let scallop_mm = arguments.scallop_mm.unwrap_or(SCALLOP_MM.min(0.1 * radius_mm));
-    let options = Options {
-        tolerance_mm: arguments.tolerance,
-        untrimmed: false,
-        parameters: FaceParameters::Edges,
-        around_mm: STEP_OVERS_AROUND * job::plane_step_over_mm(radius_mm, scallop_mm),
-    };
+    let (scallop_mm, options) = options(arguments, radius_mm);
     let tool = Tool::new(radius_mm, &job::ToolBody::default());
     let wanted = |face: &&Face| arguments.faces.is_empty() || arguments.faces.contains(&face.number);
     let faces: Vec<&Face> = model.faces.iter().filter(wanted).collect();
@@ -159,13 +165,7 @@ pub(super) fn reaches(
     faces: &[&Face],
     radius_mm: f64,
 ) -> Vec<std::result::Result<FaceReach, String>> {
-    let scallop_mm = arguments.scallop_mm.unwrap_or(SCALLOP_MM.min(0.1 * radius_mm));
-    let options = Options {
-        tolerance_mm: arguments.tolerance,
-        untrimmed: false,
-        parameters: FaceParameters::Edges,
-        around_mm: STEP_OVERS_AROUND * job::plane_step_over_mm(radius_mm, scallop_mm),
-    };
+    let (scallop_mm, options) = options(arguments, radius_mm);
     let setup = Setup::new(Up::PlusZ, model, scallop_mm);
     let asked = Asked {
         part: &setup.part,

@@ -4,15 +4,16 @@
 //! a strip that is higher than the limit, between the ends of passes. Across the boundary nothing is left, so the direction decides.
 
 use job::{Along, Region};
+use machine::PASS_S;
+use part::LEFTOVER_SHARE;
 
-/// Most lines that are looked at, parts of an interval, and the time that each interval costs beside its length, s.
+/// Most lines that are looked at, and parts of an interval.
 const LINES_MAX: usize = 4000;
 const PARTS: u32 = 8;
-const INTERVAL_S: f64 = 0.15;
 /// Shortest interval, in step-overs, as in jobs.
 const LEAST_STEPS: f64 = 0.1;
-/// What is left may be higher than the scallop limit by this share, as `verify` counts it.
-const HIGHER: f64 = 1.03;
+/// What is left may be as many times the scallop limit, as `verify` counts it.
+const HIGHER: f64 = 1.0 + LEFTOVER_SHARE;
 /// Lines on either side of a place that may serve it.
 const BESIDE: usize = 3;
 /// Share of the area that may be left for the faster direction.
@@ -185,7 +186,7 @@ impl Passes<'_> {
                 }
             }
             if length_mm >= LEAST_STEPS * self.step_over_mm {
-                time_s += length_mm / self.feed_mm_s + INTERVAL_S;
+                time_s += length_mm / self.feed_mm_s + PASS_S;
                 intervals.push([*from, *to]);
             }
         }
