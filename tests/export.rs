@@ -351,9 +351,15 @@ fn check_step_over(job: &Job, before: &PassPath<'_>, pass: &PassPath<'_>, link: 
 
 /// Checks the restrictions of Grbl 1.1: length of its line buffer, set of words.
 fn check_grbl(program: &str) {
-    const WORDS: [&str; 14] = [
-        "G0", "G1", "G2", "G3", "G17", "G18", "G19", "G21", "G40", "G90", "G93", "G94", "M2", "M3",
+    const WORDS: [&str; 15] = [
+        "G0", "G1", "G2", "G3", "G17", "G18", "G19", "G21", "G40", "G90", "G91.1", "G93", "G94", "M2", "M3",
     ];
+    // Centres are relative to the start of the arc, whatever the program before this one has set.
+    let first = program.lines().find(|line| line.starts_with('G'));
+    assert!(
+        first.is_some_and(|line| line.contains("G91.1")),
+        "centres of arcs may be read as absolute"
+    );
     for line in program.lines() {
         assert!(line.len() <= 80 && line.is_ascii(), "{line}");
         if line.starts_with('(') {

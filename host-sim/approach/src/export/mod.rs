@@ -201,7 +201,8 @@ fn head(blocks: &mut Blocks<'_>, job: &Job, options: &Options, passes: usize) {
         "{what} {} mm/min, tolerance {} mm",
         job.feed_mm_min, job.chord_mm
     ));
-    blocks.line("G17G21G40G90");
+    // Centres of arcs are relative to their start (G91.1): a controller may have been left with absolute ones.
+    blocks.line("G17G21G40G90G91.1");
     if options.dialect == Dialect::Linuxcnc {
         // Path blending within the tolerance; naive CAM detector off, because it would join cuts of different feeds.
         blocks.line(&format!("G64P{}Q0", job.chord_mm));
