@@ -1,12 +1,13 @@
 //! The job file: TOML to a [`Job`], checked for shape and range.
 //!
 //! ```text
-//! text --toml--> spanned tables --section.rs--> typed values --surface.rs, machine.rs, steps.rs--> Job
+//! text --toml--> spanned tables --section.rs--> typed values --surface.rs, cut.rs, machine.rs, ..--> Job
 //!                                  any step --JobError--> file, line, caret, remedy
 //! ```
 //!
 //! Reading a job file starts no process: a surface of `kind = "file"` is resolved by the [`FaceReader`] that the caller passes.
 
+mod cut;
 mod file;
 mod homing;
 mod machine;
@@ -24,15 +25,15 @@ mod text;
 
 use std::path::Path;
 
-use interp_core::command::OVERRIDE_MAX_PERCENT;
-use interp_core::job::STEP_MAX_MM;
 use job::{
-    Along, AlongChoice, CHORD_DEFAULT_MM, CadSource, FEED_MAX_MM_MIN, FEED_MIN_MM_MIN, Job, JobError,
-    MachineProfile, MachineSpec, OVERRUN_MAX_MM, Pattern, Side, Spacing, Start, StartChoice,
+    Along, AlongChoice, CadSource, Job, JobError, MachineProfile, MachineSpec, StartChoice, SurfaceSpec,
 };
 use patches::placement::Placement;
 use section::{Reader, Section};
 
+use cut::CutSpec;
+
+pub use cut::feed_max_within_limits;
 pub use file::{
     Face, FaceError, FaceReader, FaceRegion, FaceSurface, PART_TOLERANCE_MM, STEEPEST_DEG,
     TOLERANCE_DEFAULT_MM, TOLERANCE_MAX_MM,
@@ -142,12 +143,12 @@ fn parse_on(
     } else {
         0.0
     };
-    let (of_face, face) = surface::read(&document.section("surface")?, faces, around_mm)?;
-    let (unplaced, trimmed) = (of_face.surface, of_face.trimmed);
-    let (surface, placement) = match document.optional_section("placement")? {
-        Some(section) => placement::place(&section, &unplaced)?,
-        None => (unplaced.clone(), Placement::default()),
-    };
+    let PlacedSurface {
+        surface,
+        rotate_deg,
+        cad,
+        trimmed,
+    } = read_surface(&document, faces, around_mm)?;
     let region = match document.optional_section("region")? {
         Some(section) => Some(region::read(&section, &surface)?),
         None => None,
@@ -155,49 +156,24 @@ fn parse_on(
     let (radius_mm, body) = setup::tool(&document.section("tool")?)?;
     let setup = setup::read(&document)?;
     let cut = document.section("cut")?;
-    cut.only(
-        &[
-            "feed_mm_min",
-            "scallop_mm",
-            "along",
-            "side",
-            "pattern",
-            "spacing",
-            "start",
-            "chord_mm",
-            "overrun_mm",
-        ],
-        &[],
-    )?;
-    let below_radius = |key: &str, remedy: &str| {
-        let value = cut.number(key)?;
-        if value > 0.0 && value < radius_mm {
-            return Ok(value);
-        }
-        let what =
-            format!("`{key}` must be above 0 and below the ball radius of {radius_mm} mm, not {value}");
-        Err(cut.error(key, what, remedy))
-    };
-    let directions = [("u", Some(Along::U)), ("v", Some(Along::V)), ("auto", None)];
-    let along = cut.choice("along", &directions)?;
+    let CutSpec {
+        along,
+        spacing,
+        is_start_auto,
+        feed_mm_min,
+        scallop_mm,
+        side,
+        pattern,
+        chord_mm,
+        overrun_mm,
+    } = cut::read(&cut, radius_mm)?;
     let mut origin = reader.origin(&document);
-    origin.set_cad(face.map(|face| CadSource {
-        path: face.path,
-        face: face.number,
-        tolerance_mm: face.tolerance_mm,
-        untrimmed: face.untrimmed,
-        parameters: face.parameters,
-        around_mm: face.around_mm,
-        trimmed,
-        surface: unplaced,
-        scale: placement.scale,
-    }));
+    origin.set_cad(cad);
     origin.set_part(part);
-    origin.set_rotate_deg(placement.rotate_deg);
+    origin.set_rotate_deg(rotate_deg);
     if along.is_none() {
         origin.set_along_choice(AlongChoice::Auto);
     }
-    let (spacing, is_start_auto) = read_spacing(&cut)?;
     if is_start_auto {
         origin.set_start_choice(StartChoice::Auto);
     }
@@ -207,28 +183,14 @@ fn parse_on(
         radius_mm,
         body,
         setup,
-        feed_mm_min: cut.number_within(
-            "feed_mm_min",
-            FEED_MIN_MM_MIN,
-            FEED_MAX_MM_MIN,
-            "the feed in mm/min, e.g. 600",
-        )?,
-        scallop_mm: below_radius("scallop_mm", "give the scallop height limit in mm, e.g. 0.005")?,
+        feed_mm_min,
+        scallop_mm,
         along: along.unwrap_or(Along::U),
-        side: cut.choice("side", &[("up", Side::Up), ("+", Side::Plus), ("-", Side::Minus)])?,
-        pattern: match cut.has("pattern") {
-            true => cut.choice("pattern", &[("zig", Pattern::Zig), ("zigzag", Pattern::Zigzag)])?,
-            false => Pattern::Zig,
-        },
+        side,
+        pattern,
         spacing,
-        chord_mm: match cut.has("chord_mm") {
-            true => below_radius("chord_mm", "give the chord error limit in mm, e.g. 0.005")?,
-            false => CHORD_DEFAULT_MM.min(0.5 * radius_mm),
-        },
-        overrun_mm: match cut.has("overrun_mm") {
-            true => read_overrun(&cut)?,
-            false => 0.0,
-        },
+        chord_mm,
+        overrun_mm,
         machine: MachineSpec {
             spindle: document
                 .optional_section("spindle")?
@@ -238,30 +200,58 @@ fn parse_on(
         },
         origin,
     };
-    check_feed(&cut, &job)?;
+    cut::check_feed(&cut, &job)?;
     if trimmed || job.origin.part().is_some() {
         own_region(&document, &mut job, faces)?;
     }
     Ok(job)
 }
 
-/// Largest feed of a job with axis limits, mm/min: a period at the maximum override is the core's maximum step.
-#[must_use]
-pub fn feed_max_within_limits(period_us: f64) -> f64 {
-    f64::from(STEP_MAX_MM) * 100.0 / f64::from(OVERRIDE_MAX_PERCENT) * 60e6 / period_us
+/// The surface of a job, where its file places it.
+struct PlacedSurface {
+    surface: SurfaceSpec,
+    /// As in `[placement]`.
+    rotate_deg: [f64; 3],
+    /// The face of a CAD file that it is of.
+    cad: Option<CadSource>,
+    /// The face is less of it.
+    trimmed: bool,
 }
 
-fn check_feed(cut: &Section<'_>, job: &Job) -> Result<(), JobError> {
-    let period_us = job.machine.period_us;
-    let most = feed_max_within_limits(period_us);
-    if !job.machine.has_limits() || job.feed_mm_min <= most {
-        return Ok(());
-    }
-    let what = format!(
-        "`feed_mm_min` must be at most {most} on a machine with limits and a period of {period_us} us, not {}",
-        job.feed_mm_min
-    );
-    Err(cut.error("feed_mm_min", what, "lower the feed, or shorten period_us"))
+/// Reads `[surface]` and `[placement]`; `around_mm`: how far the surface of a face goes on beyond it.
+fn read_surface(
+    document: &Section<'_>,
+    faces: &dyn FaceReader,
+    around_mm: f64,
+) -> Result<PlacedSurface, JobError> {
+    let (
+        FaceSurface {
+            surface: unplaced,
+            trimmed,
+        },
+        face,
+    ) = surface::read(&document.section("surface")?, faces, around_mm)?;
+    let (surface, placement) = match document.optional_section("placement")? {
+        Some(section) => placement::place(&section, &unplaced)?,
+        None => (unplaced.clone(), Placement::default()),
+    };
+    let cad = face.map(|face| CadSource {
+        path: face.path,
+        face: face.number,
+        tolerance_mm: face.tolerance_mm,
+        untrimmed: face.untrimmed,
+        parameters: face.parameters,
+        around_mm: face.around_mm,
+        trimmed,
+        surface: unplaced,
+        scale: placement.scale,
+    });
+    Ok(PlacedSurface {
+        surface,
+        rotate_deg: placement.rotate_deg,
+        cad,
+        trimmed,
+    })
 }
 
 /// How far the surface of a face must go on beyond it, in mm of its file, for passes to begin and end beside it.
@@ -298,56 +288,4 @@ fn own_region(document: &Section<'_>, job: &mut Job, faces: &dyn FaceReader) -> 
     job.machine.part_top_mm = made.reach.top_mm;
     job.origin.set_reach(made.reach);
     Ok(())
-}
-
-/// The rule for the distance between passes, and where passes of constant scallop height start; whether that start is chosen by trials.
-fn read_spacing(cut: &Section<'_>) -> Result<(Spacing, bool), JobError> {
-    let starts = [
-        ("edge", Some(Start::Edge)),
-        ("middle", Some(Start::Middle)),
-        ("auto", None),
-    ];
-    let start = match cut.has("start") {
-        true => cut.choice("start", &starts)?,
-        false => Some(Start::Edge),
-    };
-    let choices = [
-        ("exact", Spacing::Exact),
-        ("first-order", Spacing::FirstOrder),
-        ("constant", Spacing::Constant(start.unwrap_or(Start::Edge))),
-    ];
-    let spacing = match cut.has("spacing") {
-        true => cut.choice("spacing", &choices)?,
-        false => Spacing::Exact,
-    };
-    if start != Some(Start::Edge) && !spacing.is_constant() {
-        let word = start.map_or("auto", Start::name);
-        return Err(cut.error(
-            "start",
-            format!("`start = \"{word}\"` is for passes of constant scallop height only"),
-            "remove it, or write spacing = \"constant\"",
-        ));
-    }
-    Ok((spacing, start.is_none()))
-}
-
-/// The overrun of turns, mm.
-fn read_overrun(cut: &Section<'_>) -> Result<f64, JobError> {
-    let value = cut.number("overrun_mm")?;
-    if value > 0.0 && read_spacing(cut)?.0.is_constant() {
-        return Err(cut.error(
-            "overrun_mm",
-            "passes of constant scallop height have no turns beyond the boundary",
-            "remove it, or write spacing = \"exact\"",
-        ));
-    }
-    if (0.0..=OVERRUN_MAX_MM).contains(&value) {
-        return Ok(value);
-    }
-    let what = format!("`overrun_mm` must be at least 0 and at most {OVERRUN_MAX_MM}, not {value}");
-    Err(cut.error(
-        "overrun_mm",
-        what,
-        "give the greatest overrun of a turn in mm, e.g. 2, or 0 for none",
-    ))
 }

@@ -1,6 +1,9 @@
 //! Every kind of bad input yields its line, a message and a remedy; the sample jobs are valid.
 
-use job::{AxisLimits, HeartbeatAction, Job, JobError, MachineSpec, NurbsSpec, SurfaceSpec, units};
+use job::{
+    AxisLimits, CHORD_DEFAULT_MM, HeartbeatAction, Job, JobError, MachineSpec, NurbsSpec, Pattern, Side,
+    SurfaceSpec, units,
+};
 
 use super::*;
 
