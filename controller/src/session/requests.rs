@@ -61,7 +61,8 @@ impl Session {
     ///
     /// # Errors
     /// The reason of the refusal.
-    #[inline(never)]
+    // Inlined into its only caller, because the checks of a streamed row below it need all of the stack.
+    #[inline(always)]
     fn execute(
         &mut self,
         request: &Request,
