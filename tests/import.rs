@@ -548,6 +548,40 @@ fn hostile_files() {
     assert!(missing.what.contains("cannot read"), "{missing}");
 }
 
+/// Warnings of an IGES file name the directory entries of what was not read, as the list names those of faces.
+#[test]
+fn warnings_name_the_entry() {
+    let warnings = read(&cad("swept.igs")).unwrap().warnings;
+    for entry in ["D67: IGES entity type 140", "D65: IGES entity type 144"] {
+        assert!(
+            warnings.iter().any(|warning| warning.starts_with(entry)),
+            "{warnings:?}"
+        );
+    }
+}
+
+/// A torus whose tube is wider than its ring has an entity of its own in STEP. The flag that selects a sheet is not used: the boundary tells.
+#[test]
+fn spindle_tori_are_read() {
+    let radii = ["26.261764705882", "2.446397676523"];
+    let text = std::fs::read_to_string(cad("lens_mould.step")).unwrap();
+    let ring = format!("TOROIDAL_SURFACE('',#130,{},{});", radii[0], radii[1]);
+    let spindle = format!(
+        "DEGENERATE_TOROIDAL_SURFACE('',#130,{},{},.T.);",
+        radii[1], radii[0]
+    );
+    assert!(text.contains(&ring));
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("spindle.step");
+    std::fs::write(&path, text.replace(&ring, &spindle)).unwrap();
+    let model = read(&path).unwrap();
+    let torus = model.faces.iter().find_map(|face| match face.surface {
+        Surface::Torus { major, minor, .. } => Some([major, minor].map(|radius| format!("{radius}"))),
+        _ => None,
+    });
+    assert_eq!(torus.unwrap(), [radii[1], radii[0]]);
+}
+
 /// A file with the wrong extension is read by its content, with a warning.
 #[test]
 fn wrong_ending() {

@@ -7,6 +7,7 @@ use cadmpeg_core::decode::{DecodeDepth, DecodePolicy, ResourceLimits};
 use cadmpeg_ir::geometry::{ProceduralSurfaceDefinition as Made, SolvedSurfaceGeometry, SurfaceGeometry};
 use cadmpeg_ir::products::{OccurrenceParent, PrototypeReference};
 use cadmpeg_ir::report::Severity;
+use cadmpeg_ir::report::loss::LossNote;
 use cadmpeg_ir::topology::{BodyKind, Sense};
 use cadmpeg_ir::{Codec, DecodeOptions};
 
@@ -154,8 +155,17 @@ pub(crate) fn decode(
     let room = WARNINGS_MAX.saturating_sub(model.warnings.len());
     model
         .warnings
-        .extend(telling.take(room).map(|loss| shortened(&loss.message)));
+        .extend(telling.take(room).map(|loss| shortened(&attributed(loss))));
     Ok(model)
+}
+
+/// The message of a loss, with the IGES directory entry that it is about: `D33: ...`.
+fn attributed(loss: &LossNote) -> String {
+    let tag = loss.provenance.as_ref().and_then(|place| place.tag.as_deref());
+    match tag.and_then(|tag| tag.strip_prefix("directory_entry:")) {
+        Some(entry) => format!("{entry}: {}", loss.message),
+        None => loss.message.clone(),
+    }
 }
 
 /// Message of `cadmpeg` about the surface that a warning names.
@@ -503,7 +513,6 @@ impl<'m> Translation<'m> {
             Made::CurveBounded { support, .. } => self.surface(support.as_str(), depth + 1),
             Made::Subset(subset) => self.surface(subset.support().as_str(), depth + 1),
             Made::SubSurface(subset) => self.surface(subset.support().as_str(), depth + 1),
-            Made::DegenerateTorus { .. } => Err("it is a self-intersecting torus".to_owned()),
             _ => Err(format!("surface {} has an unsupported construction", entity(id))),
         }
     }
