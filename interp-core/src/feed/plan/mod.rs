@@ -299,10 +299,10 @@ impl Plan {
         (cursor.x - 1.0).at_least(0.0) * self.step_s
     }
 
-    /// Whether the planning is as short as the nodes and stations that there are. With an end at speed it takes the time of the most: more steps of the
-    /// method would leave less of the limits to a hold.
-    pub(crate) fn is_counted(&self) -> bool {
-        self.pinned() == [0; 2]
+    /// Whether it begins or ends at speed, in a turn. Such a plan takes the planning time of the greatest number of nodes and stations, however many
+    /// it has: more Newton steps would leave less of the limits to a hold.
+    pub(crate) fn has_turn(&self) -> bool {
+        self.pinned() != [0; 2]
     }
 
     /// Coefficients of the pace that the speeds at the ends fix, at the start and at the end.

@@ -16,7 +16,7 @@ use crate::math::number::Bounded;
 use nodes::GROWTH;
 pub(crate) use nodes::NODES_COUNT;
 
-/// Spacing of nodes that is fine enough, s; its growth per second away from busy places; the widest, s.
+/// Usual spacing of nodes, s: a finer one makes no better plan.
 const SPACING: f32 = 5e-3;
 /// Bisections of the spacing.
 const BISECTIONS: u8 = 12;
@@ -29,7 +29,7 @@ const NODES_A_PORTION: u16 = 60;
 const PLACES_A_PORTION: u16 = 50;
 const KNOTS_A_PORTION: u16 = 40;
 
-/// Cycles of a portion without any items.
+/// Cycles of a portion with no item.
 const PORTION_LEAST: u32 = 1_500;
 /// Most stations.
 const STATIONS: u16 = 168;
@@ -47,11 +47,11 @@ enum Stage {
     /// Inserts the rests at jumps.
     Rests,
     Busy,
-    /// Whether even spacing is fine enough.
+    /// Tries whether there are enough nodes for the usual spacing everywhere,
     TryEven,
-    /// Whether it is, growing away from busy places.
+    /// or for one that grows away from places where the speed changes;
     TryGrowing,
-    /// Coarser until the widest spacing fits.
+    /// if not, makes the spacing at the ends coarser.
     Coarsen,
     Bisect(u8),
     Times,
@@ -74,20 +74,24 @@ enum Vary {
 pub(crate) struct Walker {
     stage: Stage,
     index: u16,
-    /// Least jerk along the path, mm/s^3; greatest acceleration, mm/s^2; greatest speed, mm/s.
+    /// Least jerk along the path, mm/s^3.
     jerk: f32,
+    /// Greatest acceleration, mm/s^2.
     acceleration: f32,
+    /// Greatest speed, mm/s.
     speed: f32,
-    /// Duration of the acceleration-limited motion, and length of the mean, s.
+    /// Duration of the acceleration-limited motion, s.
     duration: f32,
+    /// Length of the moving average, s.
     mean_s: f32,
     intervals: u16,
     busy: u16,
     vary: Vary,
     low: f32,
     high: f32,
-    /// Spacing at the ends, s, and its greatest growth.
+    /// Spacing at the ends, s.
     ends: f32,
+    /// Greatest growth of the spacing, s/s.
     growth: f32,
     /// Least spacing, s.
     finest: f32,
@@ -105,7 +109,8 @@ pub(crate) struct Walker {
     speeds: [f32; 2],
     mean: u16,
     tightened: f32,
-    /// Where there are more intervals than leave the plan longer than its planning: as many as do, and the periods of that when they were chosen.
+    /// Set where more intervals were chosen than can be planned within the plan's own duration: the number that can, and the least periods of a plan
+    /// when they were chosen.
     usual: Option<(u16, u32)>,
 }
 
@@ -158,7 +163,8 @@ impl Walker {
         self.jerk = f32::MAX;
     }
 
-    /// Where there are more intervals than leave the plan longer than its planning: as many as do, and the least periods of that when they were chosen.
+    /// Set where more intervals were chosen than can be planned within the plan's own duration: the number that can, and the least periods of a plan
+    /// when they were chosen.
     pub(crate) const fn usual(&self) -> Option<(u16, u32)> {
         self.usual
     }
@@ -167,7 +173,7 @@ impl Walker {
     pub(crate) fn cycles(&self, plan: &Plan) -> u32 {
         let stations = plan.stations.count();
         let left = |of: u16, most: u16| of.saturating_sub(self.index).min(most);
-        // Of so many items, by the cycles of the most that there may be.
+        // Cycles in proportion to the number of items, from those of a full portion.
         let (cycles, [count, most]) = match self.stage {
             Stage::Caps => (18_100, [left(stations, STATIONS_A_PORTION), STATIONS_A_PORTION]),
             Stage::Jumps => (12_000, [JUMPS_A_PORTION, JUMPS_A_PORTION]),
@@ -191,12 +197,12 @@ impl Walker {
             Stage::Knots => (10_500, [left(self.intervals, KNOTS_A_PORTION), KNOTS_A_PORTION]),
             Stage::Done => return 0,
         };
-        let count = if plan.is_counted() { count.min(most) } else { most };
+        let count = if plan.has_turn() { most } else { count.min(most) };
         let [count, most] = [count, most].map(u32::from);
         PORTION_LEAST + (cycles - PORTION_LEAST) * count / most
     }
 
-    /// One portion; whether the walk is complete.
+    /// One portion. Returns whether the walk is complete.
     #[inline(never)]
     pub(crate) fn work(
         &mut self,
@@ -205,39 +211,9 @@ impl Walker {
         limits: &MotionLimits,
         deadlines: Deadlines,
     ) -> bool {
-        let count = plan.stations.count();
         self.stage = match self.stage {
-            Stage::Caps => {
-                self.speeds = plan.ends;
-                let end = count.min(self.index + STATIONS_A_PORTION);
-                for station in self.index..end {
-                    let Station { arc_nm, q } = plan.stations.get(station);
-                    let share = if plan.is_near_turn(*arc_nm) {
-                        self.tightened
-                    } else {
-                        1.0
-                    };
-                    self.cap(lists, station, q, limits, share);
-                }
-                self.next(end, end == count, Stage::Caps, Stage::Jumps)
-            }
-            Stage::Jumps => {
-                let mut left = JUMPS_A_PORTION;
-                let mut station = self.index;
-                while station < count && left > 0 {
-                    if plan.stations.is_jump(station) {
-                        self.slow_at_jump(lists, plan, station, limits);
-                        left -= 1;
-                    }
-                    station += 1;
-                }
-                let next = if self.is_from_rest_to_rest() {
-                    Stage::Backwards
-                } else {
-                    Stage::Flatten
-                };
-                self.next(station, station >= count, Stage::Jumps, next)
-            }
+            Stage::Caps => self.cap_stations(lists, plan, limits),
+            Stage::Jumps => self.slow_at_jumps(lists, plan, limits),
             Stage::Flatten => {
                 self.flatten(lists, plan);
                 Stage::Backwards
@@ -246,16 +222,7 @@ impl Walker {
                 self.backwards(lists, plan);
                 Stage::Forwards
             }
-            Stage::Forwards => {
-                let last = count.saturating_sub(1);
-                let end = last.min(self.index + CELLS_A_PORTION);
-                self.forwards(lists, plan, self.index, end);
-                if end == last {
-                    self.choose_mean(plan);
-                    self.choose_intervals(limits, deadlines);
-                }
-                self.next(end, end == last, Stage::Forwards, Stage::Rests)
-            }
+            Stage::Forwards => self.go_forwards(lists, plan, limits, deadlines),
             Stage::Rests => {
                 self.rest_at_jumps(lists, plan);
                 Stage::Busy
@@ -264,107 +231,182 @@ impl Walker {
                 self.find_busy(lists, plan, limits);
                 Stage::TryEven
             }
-            Stage::TryEven => {
-                if self.fits(lists, SPACING.at_least(self.finest), 0.0) {
-                    self.vary = Vary::Even;
-                    let least = 0.25 * (self.duration + self.mean_s) / f32::from(self.intervals);
-                    let fine = SPACING.at_least(self.finest);
-                    (self.low, self.high) = (least.at_least(self.finest).at_most(fine), fine);
-                    Stage::Bisect(0)
-                } else {
-                    Stage::TryGrowing
-                }
-            }
-            Stage::TryGrowing => {
-                if self.fits(lists, SPACING.at_least(self.finest), self.growth) {
-                    self.vary = Vary::Growth;
-                    (self.low, self.high) = (1e-4, self.growth);
-                    Stage::Bisect(0)
-                } else {
-                    self.vary = Vary::Coarse;
-                    let widest = 8.0 * (self.duration + self.mean_s) / f32::from(self.intervals);
-                    let fine = SPACING.at_least(self.finest);
-                    (self.low, self.high) = (fine, widest.at_least(fine));
-                    Stage::Coarsen
-                }
-            }
-            Stage::Coarsen => {
-                if self.fits(lists, self.high, self.growth) || self.coarsenings >= COARSENINGS {
-                    Stage::Bisect(0)
-                } else {
-                    // The usual spacing may fit now. The mean takes the nodes that are left over, and one longer than the rests would end them.
-                    self.ends *= 1.5;
-                    self.coarsenings += 1;
-                    Stage::TryEven
-                }
-            }
+            Stage::TryEven => self.try_even(lists),
+            Stage::TryGrowing => self.try_growing(lists),
+            Stage::Coarsen => self.coarsen(lists),
             Stage::Bisect(BISECTIONS..) => Stage::Times,
-            Stage::Bisect(tried) => {
-                let middle = sqrt(self.low * self.high);
-                let [spacing, growth] = self.spacing(middle);
-                if self.fits(lists, spacing, growth) {
-                    self.high = middle;
-                } else {
-                    self.low = middle;
-                }
-                Stage::Bisect(tried + 1)
-            }
+            Stage::Bisect(tried) => self.bisect(lists, tried),
             Stage::Times => {
                 self.times(lists, plan);
                 Stage::Increments
             }
-            Stage::Increments => {
-                let end = self.times.min(self.index + PLACES_A_PORTION);
-                for node in self.index..end {
-                    self.increment(lists, plan, node);
-                }
-                if end == self.times && self.is_from_rest_to_rest() {
-                    self.begin_means(plan);
-                } else if end == self.times {
-                    self.begin_means_at_speed(lists, plan);
-                }
-                self.next(end, end == self.times, Stage::Increments, Stage::Means)
-            }
-            Stage::Means => {
-                let count = plan.intervals + 2;
-                let end = count.min(self.index + NODES_A_PORTION);
-                for index in self.index..end {
-                    if self.is_from_rest_to_rest() {
-                        self.mean(lists, plan, index);
-                    } else {
-                        self.mean_at_speed(lists, plan, index);
-                    }
-                }
-                if end == count {
-                    (self.cell, self.sum_q10) = (0, 0);
-                    plan.trim_q10 = 0;
-                }
-                self.next(end, end == count, Stage::Means, Stage::Nodes)
-            }
-            Stage::Nodes => {
-                let count = plan.intervals + 1;
-                let end = count.min(self.index + PLACES_A_PORTION);
-                for node in self.index..end {
-                    (self.cell, self.sum_q10) = plan.place_node(node, self.cell, self.sum_q10);
-                }
-                if end == count {
-                    plan.trim(self.sum_q10);
-                    plan.knot_count = 0;
-                }
-                self.next(end, end == count, Stage::Nodes, Stage::Knots)
-            }
-            Stage::Knots => {
-                let end = plan.intervals.min(self.index + KNOTS_A_PORTION);
-                for interval in self.index..end {
-                    find_knots(plan, interval, limits);
-                }
-                self.next(end, end == plan.intervals, Stage::Knots, Stage::Done)
-            }
+            Stage::Increments => self.increments(lists, plan),
+            Stage::Means => self.means(lists, plan),
+            Stage::Nodes => self.place_nodes(plan),
+            Stage::Knots => self.find_knots(plan, limits),
             Stage::Done => Stage::Done,
         };
         self.stage == Stage::Done
     }
 
+    fn cap_stations(&mut self, lists: &mut Lists, plan: &Plan, limits: &MotionLimits) -> Stage {
+        self.speeds = plan.ends;
+        let count = plan.stations.count();
+        let end = count.min(self.index + STATIONS_A_PORTION);
+        for station in self.index..end {
+            let Station { arc_nm, q } = plan.stations.get(station);
+            let share = if plan.is_near_turn(*arc_nm) {
+                self.tightened
+            } else {
+                1.0
+            };
+            self.cap(lists, station, q, limits, share);
+        }
+        self.next(end, end == count, Stage::Caps, Stage::Jumps)
+    }
+
+    fn slow_at_jumps(&mut self, lists: &mut Lists, plan: &Plan, limits: &MotionLimits) -> Stage {
+        let count = plan.stations.count();
+        let mut left = JUMPS_A_PORTION;
+        let mut station = self.index;
+        while station < count && left > 0 {
+            if plan.stations.is_jump(station) {
+                self.slow_at_jump(lists, plan, station, limits);
+                left -= 1;
+            }
+            station += 1;
+        }
+        let next = if self.is_from_rest_to_rest() {
+            Stage::Backwards
+        } else {
+            Stage::Flatten
+        };
+        self.next(station, station >= count, Stage::Jumps, next)
+    }
+
+    fn go_forwards(
+        &mut self,
+        lists: &mut Lists,
+        plan: &mut Plan,
+        limits: &MotionLimits,
+        deadlines: Deadlines,
+    ) -> Stage {
+        let last = plan.stations.count().saturating_sub(1);
+        let end = last.min(self.index + CELLS_A_PORTION);
+        self.forwards(lists, plan, self.index, end);
+        if end == last {
+            self.choose_mean(plan);
+            self.choose_intervals(limits, deadlines);
+        }
+        self.next(end, end == last, Stage::Forwards, Stage::Rests)
+    }
+
+    /// The usual spacing, s: not below the finest.
+    fn usual_spacing(&self) -> f32 {
+        SPACING.at_least(self.finest)
+    }
+
+    /// Mean spacing of the nodes, s.
+    fn mean_spacing(&self) -> f32 {
+        (self.duration + self.mean_s) / f32::from(self.intervals)
+    }
+
+    fn try_even(&mut self, lists: &Lists) -> Stage {
+        let usual = self.usual_spacing();
+        if !self.fits(lists, usual, 0.0) {
+            return Stage::TryGrowing;
+        }
+        self.vary = Vary::Even;
+        let least = 0.25 * self.mean_spacing();
+        (self.low, self.high) = (least.at_least(self.finest).at_most(usual), usual);
+        Stage::Bisect(0)
+    }
+
+    fn try_growing(&mut self, lists: &Lists) -> Stage {
+        let usual = self.usual_spacing();
+        if self.fits(lists, usual, self.growth) {
+            self.vary = Vary::Growth;
+            (self.low, self.high) = (1e-4, self.growth);
+            return Stage::Bisect(0);
+        }
+        self.vary = Vary::Coarse;
+        (self.low, self.high) = (usual, (8.0 * self.mean_spacing()).at_least(usual));
+        Stage::Coarsen
+    }
+
+    fn coarsen(&mut self, lists: &Lists) -> Stage {
+        if self.fits(lists, self.high, self.growth) || self.coarsenings >= COARSENINGS {
+            return Stage::Bisect(0);
+        }
+        // The usual spacing may fit now. The moving average takes the nodes that are left over, and must not be longer than the rests.
+        self.ends *= 1.5;
+        self.coarsenings += 1;
+        Stage::TryEven
+    }
+
+    fn bisect(&mut self, lists: &Lists, tried: u8) -> Stage {
+        let middle = sqrt(self.low * self.high);
+        let [spacing, growth] = self.spacing(middle);
+        if self.fits(lists, spacing, growth) {
+            self.high = middle;
+        } else {
+            self.low = middle;
+        }
+        Stage::Bisect(tried + 1)
+    }
+
+    fn increments(&mut self, lists: &mut Lists, plan: &mut Plan) -> Stage {
+        let end = self.times.min(self.index + PLACES_A_PORTION);
+        for node in self.index..end {
+            self.increment(lists, plan, node);
+        }
+        if end == self.times && self.is_from_rest_to_rest() {
+            self.begin_means(plan);
+        } else if end == self.times {
+            self.begin_means_at_speed(lists, plan);
+        }
+        self.next(end, end == self.times, Stage::Increments, Stage::Means)
+    }
+
+    fn means(&mut self, lists: &mut Lists, plan: &mut Plan) -> Stage {
+        let count = plan.intervals + 2;
+        let end = count.min(self.index + NODES_A_PORTION);
+        for index in self.index..end {
+            if self.is_from_rest_to_rest() {
+                self.mean(lists, plan, index);
+            } else {
+                self.mean_at_speed(lists, plan, index);
+            }
+        }
+        if end == count {
+            (self.cell, self.sum_q10) = (0, 0);
+            plan.trim_q10 = 0;
+        }
+        self.next(end, end == count, Stage::Means, Stage::Nodes)
+    }
+
+    fn place_nodes(&mut self, plan: &mut Plan) -> Stage {
+        let count = plan.intervals + 1;
+        let end = count.min(self.index + PLACES_A_PORTION);
+        for node in self.index..end {
+            (self.cell, self.sum_q10) = plan.place_node(node, self.cell, self.sum_q10);
+        }
+        if end == count {
+            plan.trim(self.sum_q10);
+            plan.knot_count = 0;
+        }
+        self.next(end, end == count, Stage::Nodes, Stage::Knots)
+    }
+
+    fn find_knots(&mut self, plan: &mut Plan, limits: &MotionLimits) -> Stage {
+        let end = plan.intervals.min(self.index + KNOTS_A_PORTION);
+        for interval in self.index..end {
+            find_knots(plan, interval, limits);
+        }
+        self.next(end, end == plan.intervals, Stage::Knots, Stage::Done)
+    }
+
+    /// Goes on at `index` of a stage, or to the next stage where this one is over.
     const fn next(&mut self, index: u16, is_over: bool, stage: Stage, next: Stage) -> Stage {
         self.index = if is_over { 0 } else { index };
         if is_over { next } else { stage }

@@ -300,30 +300,7 @@ impl Lookahead {
         let is_first_look = self.halvings == 0 || self.is_on_front();
         let mut estimator = estimator.filter(|_| self.whole.is_none() && is_first_look);
         self.task = match self.task {
-            Task::Patch => {
-                let first = self.patches == 0;
-                if first {
-                    self.piece = out.route.first(job);
-                }
-                self.patch.lay(job, &out.route, &self.piece)?;
-                self.range = self.piece.range;
-                if self.is_on_front() {
-                    self.begin_stretch(job, axes, out)?;
-                    self.task = Task::Extend;
-                    return Ok(());
-                }
-                out.point |= self.patch.point;
-                if let Some(estimator) = estimator {
-                    if first && self.goes_on {
-                        estimator.go_on(job, &out.route);
-                    } else if first {
-                        estimator.begin(job, &out.route);
-                    }
-                    estimator.begin_patch();
-                }
-                self.choose_cells(job, out);
-                Task::Station
-            }
+            Task::Patch => self.begin_patch(job, axes, estimator, out)?,
             Task::Extend => self.extend_stretch(job, out),
             Task::Station if self.is_on_front() && self.is_beyond_piece() => {
                 let next = out.route.next(job, &self.piece);
@@ -352,38 +329,8 @@ impl Lookahead {
                 }
                 Task::Estimate(looks - 1)
             }
-            Task::Close => {
-                if let Some(whole) = self.whole {
-                    self.close_within(&whole, out);
-                    self.task = self.choose_link(job, axes, None, out);
-                    return Ok(());
-                }
-                if !self.goes_on && looks_again(job, estimator.as_deref_mut()) {
-                    let (pass, route, head) = (out.pass, out.route, self.turn);
-                    self.line = None;
-                    self.begin(pass, route, &head, out);
-                    return Ok(());
-                }
-                let rows = estimator.as_deref().map(|estimator| *estimator.rows());
-                if self.close(job, estimator, lines, out)? {
-                    self.choose_link(job, axes, rows.as_ref(), out)
-                } else {
-                    Task::Seek
-                }
-            }
-            Task::Seek => match lines.seek(job, out.pass)? {
-                NextPass::Sought => Task::Seek,
-                NextPass::Found => {
-                    out.next = lines.take(job.header);
-                    let rows = estimator.as_deref().map(StepOverEstimator::rows);
-                    let is_joined = |route: &Route| lines.joins(job.header, &out.route, route, rows);
-                    out.steps_over = job.header.pattern == Pattern::Zigzag
-                        && !out.is_tip
-                        && out.next.as_ref().is_some_and(is_joined);
-                    self.choose_link(job, axes, rows, out)
-                }
-                NextPass::None => self.choose_link(job, axes, None, out),
-            },
+            Task::Close => self.close_pass(job, axes, estimator, lines, out)?,
+            Task::Seek => self.seek_next(job, axes, estimator.as_deref(), lines, out)?,
             Task::Head(index) => {
                 self.push_half(true, index, out);
                 if index + 1 < turn::STATIONS {
@@ -410,6 +357,87 @@ impl Lookahead {
             Task::Done => Task::Done,
         };
         Ok(())
+    }
+
+    fn begin_patch(
+        &mut self,
+        job: &Job<'_>,
+        axes: &AxisLimits,
+        estimator: Option<&mut StepOverEstimator>,
+        out: &mut PassPlan,
+    ) -> Result<Task> {
+        let is_first = self.patches == 0;
+        if is_first {
+            self.piece = out.route.first(job);
+        }
+        self.patch.lay(job, &out.route, &self.piece)?;
+        self.range = self.piece.range;
+        if self.is_on_front() {
+            self.begin_stretch(job, axes, out)?;
+            return Ok(Task::Extend);
+        }
+        out.point |= self.patch.point;
+        if let Some(estimator) = estimator {
+            if is_first && self.goes_on {
+                estimator.go_on(job, &out.route);
+            } else if is_first {
+                estimator.begin(job, &out.route);
+            }
+            estimator.begin_patch();
+        }
+        self.choose_cells(job, out);
+        Ok(Task::Station)
+    }
+
+    /// After the last patch: looks again at the whole pass, or chooses the next pass and the link to it.
+    fn close_pass(
+        &mut self,
+        job: &Job<'_>,
+        axes: &AxisLimits,
+        mut estimator: Option<&mut StepOverEstimator>,
+        lines: &mut RegionLines,
+        out: &mut PassPlan,
+    ) -> Result<Task> {
+        if let Some(whole) = self.whole {
+            self.close_within(&whole, out);
+            return Ok(self.choose_link(job, axes, None, out));
+        }
+        if !self.goes_on && looks_again(job, estimator.as_deref_mut()) {
+            let (pass, route, head) = (out.pass, out.route, self.turn);
+            self.line = None;
+            self.begin(pass, route, &head, out);
+            return Ok(self.task);
+        }
+        let rows = estimator.as_deref().map(|estimator| *estimator.rows());
+        Ok(if self.close(job, estimator, lines, out)? {
+            self.choose_link(job, axes, rows.as_ref(), out)
+        } else {
+            Task::Seek
+        })
+    }
+
+    /// Seeks the next line of a region, in portions.
+    fn seek_next(
+        &mut self,
+        job: &Job<'_>,
+        axes: &AxisLimits,
+        estimator: Option<&StepOverEstimator>,
+        lines: &mut RegionLines,
+        out: &mut PassPlan,
+    ) -> Result<Task> {
+        Ok(match lines.seek(job, out.pass)? {
+            NextPass::Sought => Task::Seek,
+            NextPass::Found => {
+                out.next = lines.take(job.header);
+                let rows = estimator.map(StepOverEstimator::rows);
+                let is_joined = |route: &Route| lines.joins(job.header, &out.route, route, rows);
+                out.steps_over = job.header.pattern == Pattern::Zigzag
+                    && !out.is_tip
+                    && out.next.as_ref().is_some_and(is_joined);
+                self.choose_link(job, axes, rows, out)
+            }
+            NextPass::None => self.choose_link(job, axes, None, out),
+        })
     }
 
     /// Pass, path and side parameter of the station.

@@ -338,113 +338,20 @@ impl Sequencer {
     fn work_on_pass(&mut self, job: &Job<'_>, axes: &AxisLimits, run: &mut Run) {
         let (now, next) = both(&mut self.plans, self.second);
         match self.planning {
-            Planning::Awaited(pass) => match run.next_pass(job) {
-                Ok(NextRoute::Pass(route)) => {
-                    next.route = route;
-                    self.planning = Planning::Requested(pass);
-                }
-                // Nothing that could make it is left: a fault, not a wait without end.
-                Ok(NextRoute::NotYet) if run.front_cycles() == 0 => {
-                    self.pending = Some(Fault::new(FaultKind::IntervalTooSmall, 0.0));
-                }
-                Ok(NextRoute::NotYet) => {}
-                Ok(NextRoute::None) => self.planning = Planning::Complete,
-                Err(fault) => self.pending = Some(fault),
-            },
+            Planning::Awaited(pass) => self.await_route(job, run, pass),
             Planning::AwaitsRows(_) => {}
             Planning::Requested(pass) if run.lacks_rows(job, next.route.side.span) => {
                 self.planning = Planning::AwaitsRows(pass);
             }
-            Planning::Requested(pass) => {
-                if pass == self.first.pass {
-                    // It begins at rest, wherever the pass before it would have led.
-                    now.tail = Turn::NONE;
-                }
-                if let (Some(estimator), lines) = run.estimator_and_lines() {
-                    estimator.enter_row(job.header, next.route.side.span, now.tail.exists());
-                    if lines.begins_apart() {
-                        estimator.begin_apart();
-                    }
-                }
-                self.lookahead.begin(pass, next.route, &now.tail, next);
-                next.is_last = run.is_last_pass();
-                self.planning = Planning::Stations;
-            }
+            Planning::Requested(pass) => self.begin_stations(job, run, pass),
             Planning::Stations => {
                 let (estimator, lines) = run.estimator_and_lines();
                 self.pending = self.lookahead.work(job, axes, estimator, lines, next).err();
                 if self.lookahead.is_done() {
-                    next.is_last |= next.next.is_none() && !job.header.spacing.is_constant();
-                    if next.pass < self.first.pass {
-                        return self.skip(run);
-                    }
-                    if let Some(path) = self.first.within() {
-                        // What follows the pass is known from all of it; it is driven from here on.
-                        self.first.path = SpanParameter::NONE;
-                        self.pending = self.lookahead.begin_within(path, next).err();
-                        return;
-                    }
-                    self.planning = if next.point {
-                        Planning::Complete
-                    } else {
-                        let feed = job.header.feed_mm_s * self.feed_factor.at_least(1.0);
-                        next.set_limits(job, MotionLimits::new(axes, feed, job.header.period_s));
-                        self.ends_on_surface = ends_on_surface(job, axes, next);
-                        self.planner.begin(&mut next.plan);
-                        Planning::Feed
-                    };
+                    self.after_stations(job, axes, run);
                 }
             }
-            Planning::Feed => {
-                let left = self.periods_to_link(job, axes);
-                let left = left.map(|left| (left - count_to_f32(SPARE_PERIODS)).at_least(0.0));
-                let (_, next) = both(&mut self.plans, self.second);
-                // The pass after it takes as long to plan; off the surface it can be waited for.
-                let is_last = next.is_last && !self.planner.is_walking();
-                let least = if !is_last && self.ends_on_surface {
-                    let front = if run.needs_front() {
-                        front_periods(self.front_spent, self.front_last)
-                    } else {
-                        0
-                    };
-                    {
-                        // Before a turn the next plan has to be complete in time: one of two passes has the longer planning.
-                        let spare = if next.turns() {
-                            SPARE_BEFORE_TURN
-                        } else {
-                            SPARE_PERIODS
-                        };
-                        self.spent.saturating_add(front).saturating_add(spare)
-                    }
-                } else {
-                    0
-                };
-                if let Some(left) = left
-                    && self.wait_pace == f32::MAX
-                    && left > PERIODS_A_SEARCH
-                {
-                    let needed = self.planner.least_left(&next.plan);
-                    if needed > left + PERIODS_LATE {
-                        self.wait_pace = (WAIT_SHARE * left / needed).at_least(WAIT_PACE_MIN);
-                    }
-                }
-                self.planner.work(
-                    &mut next.plan,
-                    Deadlines {
-                        spent: self.spent,
-                        least,
-                        left,
-                        waits: next.pass == self.first.pass,
-                    },
-                );
-                if self.planner.is_done() {
-                    self.wait_pace = f32::MAX;
-                    self.planning = Planning::Complete;
-                    if next.turns() && is_too_slow(next) {
-                        self.lookahead.avoid_turns();
-                    }
-                }
-            }
+            Planning::Feed => self.plan_feed(job, axes, run),
             Planning::Complete if self.has_hop => {
                 self.has_hop = false;
                 if let Link::Across(height_nm) = job.link_to(next.pass, axes) {
@@ -454,6 +361,119 @@ impl Sequencer {
             }
             Planning::Complete => {}
         }
+    }
+
+    /// Takes the route of a pass once it is known.
+    fn await_route(&mut self, job: &Job<'_>, run: &mut Run, pass: u32) {
+        match run.next_pass(job) {
+            Ok(NextRoute::Pass(route)) => {
+                let (_, next) = both(&mut self.plans, self.second);
+                next.route = route;
+                self.planning = Planning::Requested(pass);
+            }
+            // With no piece of work on the front left, the wait would have no end: a fault.
+            Ok(NextRoute::NotYet) if run.front_cycles() == 0 => {
+                self.pending = Some(Fault::new(FaultKind::IntervalTooSmall, 0.0));
+            }
+            Ok(NextRoute::NotYet) => {}
+            Ok(NextRoute::None) => self.planning = Planning::Complete,
+            Err(fault) => self.pending = Some(fault),
+        }
+    }
+
+    fn begin_stations(&mut self, job: &Job<'_>, run: &mut Run, pass: u32) {
+        let (now, next) = both(&mut self.plans, self.second);
+        if pass == self.first.pass {
+            // It begins at rest, whether or not a turn would lead to it.
+            now.tail = Turn::NONE;
+        }
+        if let (Some(estimator), lines) = run.estimator_and_lines() {
+            estimator.enter_row(job.header, next.route.side.span, now.tail.exists());
+            if lines.begins_apart() {
+                estimator.begin_apart();
+            }
+        }
+        self.lookahead.begin(pass, next.route, &now.tail, next);
+        next.is_last = run.is_last_pass();
+        self.planning = Planning::Stations;
+    }
+
+    /// Begins to plan the feed of the pass whose stations are known; or goes on to the place from which the run begins.
+    fn after_stations(&mut self, job: &Job<'_>, axes: &AxisLimits, run: &mut Run) {
+        let (_, next) = both(&mut self.plans, self.second);
+        next.is_last |= next.next.is_none() && !job.header.spacing.is_constant();
+        if next.pass < self.first.pass {
+            self.skip(run);
+        } else if let Some(path) = self.first.within() {
+            // The whole of the pass tells what follows it; the tool moves from this place on.
+            self.first.path = SpanParameter::NONE;
+            self.pending = self.lookahead.begin_within(path, next).err();
+        } else if next.point {
+            self.planning = Planning::Complete;
+        } else {
+            self.begin_feed(job, axes, job.header.feed_mm_s * self.feed_factor.at_least(1.0));
+        }
+    }
+
+    /// Begins to plan the feed of the next pass, at most `feed_mm_s`.
+    fn begin_feed(&mut self, job: &Job<'_>, axes: &AxisLimits, feed_mm_s: f32) {
+        let (_, next) = both(&mut self.plans, self.second);
+        next.set_limits(job, MotionLimits::new(axes, feed_mm_s, job.header.period_s));
+        self.ends_on_surface = ends_on_surface(job, axes, next);
+        self.planner.begin(&mut next.plan);
+        self.planning = Planning::Feed;
+    }
+
+    fn plan_feed(&mut self, job: &Job<'_>, axes: &AxisLimits, run: &Run) {
+        let left = self.periods_to_link(job, axes);
+        let left = left.map(|left| (left - count_to_f32(SPARE_PERIODS)).at_least(0.0));
+        let least = self.least_periods(run);
+        let (_, next) = both(&mut self.plans, self.second);
+        if let Some(left) = left
+            && self.wait_pace == f32::MAX
+            && left > PERIODS_A_SEARCH
+        {
+            let needed = self.planner.least_left(&next.plan);
+            if needed > left + PERIODS_LATE {
+                self.wait_pace = (WAIT_SHARE * left / needed).at_least(WAIT_PACE_MIN);
+            }
+        }
+        let deadlines = Deadlines {
+            spent: self.spent,
+            least,
+            left,
+            waits: next.pass == self.first.pass,
+        };
+        self.planner.work(&mut next.plan, deadlines);
+        if self.planner.is_done() {
+            self.wait_pace = f32::MAX;
+            self.planning = Planning::Complete;
+            if next.turns() && is_too_slow(next) {
+                self.lookahead.avoid_turns();
+            }
+        }
+    }
+
+    /// Least duration of the next pass, in periods: the pass after it takes as long to plan as this one, and the tool can wait for it only off the surface.
+    fn least_periods(&self, run: &Run) -> u32 {
+        let [one, other] = &self.plans;
+        let next = if self.second { one } else { other };
+        let is_last = next.is_last && !self.planner.is_walking();
+        if is_last || !self.ends_on_surface {
+            return 0;
+        }
+        let front = if run.needs_front() {
+            front_periods(self.front_spent, self.front_last)
+        } else {
+            0
+        };
+        // Before a turn the next plan has to be complete in time: one of two passes has the longer planning.
+        let spare = if next.turns() {
+            SPARE_BEFORE_TURN
+        } else {
+            SPARE_PERIODS
+        };
+        self.spent.saturating_add(front).saturating_add(spare)
     }
 
     /// Goes on to the pass after one that is skipped, as if the tool had been on it.
@@ -471,12 +491,7 @@ impl Sequencer {
 
     /// Plans the next pass anew for the override.
     fn plan_for_override(&mut self, job: &Job<'_>, axes: &AxisLimits) {
-        let feed = job.header.feed_mm_s * self.feed_factor;
-        let (_, next) = both(&mut self.plans, self.second);
-        next.set_limits(job, MotionLimits::new(axes, feed, job.header.period_s));
-        self.ends_on_surface = ends_on_surface(job, axes, next);
-        self.planner.begin(&mut next.plan);
-        self.planning = Planning::Feed;
+        self.begin_feed(job, axes, job.header.feed_mm_s * self.feed_factor);
     }
 
     /// Has the pass after the one that is followed next planned, if there is one.
