@@ -85,6 +85,22 @@ impl Piece {
         [self.to - 0.5 * jerk * left * left, jerk * left, -jerk]
     }
 
+    /// Least and greatest acceleration between two times, the cruise included.
+    fn accelerations(&self, from: f32, to: f32) -> [f32; 2] {
+        let at = |time: f32| {
+            let [_, acceleration, _] = self.rates(time.at_least(0.0));
+            acceleration
+        };
+        let (one, other) = (at(from), at(to));
+        let mut range = [one.at_most(other), one.at_least(other)];
+        let steady = [self.jerk_s, self.ramp_s - self.jerk_s];
+        if self.ramp_s > 0.0 && from <= steady[1] && to >= steady[0] {
+            let peak = at(0.5 * self.ramp_s);
+            range = [range[0].at_most(peak), range[1].at_least(peak)];
+        }
+        range
+    }
+
     /// Length between two times of the ramp, mm: by each phase's own rates, so that no long lengths are subtracted.
     fn length(&self, from: f32, to: f32) -> f32 {
         let mut at = from;
@@ -376,15 +392,29 @@ impl Course for Curve {
         self.is_last(cursor.piece) && cursor.time >= self.piece(cursor.piece).ramp_s
     }
 
-    fn use_at(&self, cursor: &CurveCursor, [r, r1, r2]: [f32; 3], _around: f32) -> Use {
+    fn use_at(&self, cursor: &CurveCursor, [r, r1, r2]: [f32; 3], around: f32) -> Use {
         let [v, a, j] = self.piece(cursor.piece).rates(cursor.time);
         let limits = &self.limits;
+        // The jerk steps, and the acceleration may change its sign, between two places.
+        let around = r * around;
+        let accelerations = self.accelerations_beside(cursor, [around; 2], v);
+        let [before, behind] = self.jerk_beside(cursor, around, v);
+        let [one, other] = accelerations.map(|a| (a * r * r + v * r1).abs());
+        let fastest = fastest_around([v, a, j], around);
+        let [by_one, by_other] = accelerations.map(|a| 3.0 * a * r * r1);
+        let least = j.at_most(before).at_most(behind) * r * r * r + by_one.at_most(by_other);
+        let greatest = j.at_least(before).at_least(behind) * r * r * r + by_one.at_least(by_other);
+        let [least, greatest] = [least, greatest].map(|jerk| (jerk + fastest * r2).abs());
         Use {
             feed: 0.0,
             velocity: v * r / limits.speed,
-            acceleration: (a * r * r + v * r1).abs() / limits.acceleration,
-            jerk: ((j * r * r + 3.0 * a * r1) * r + v * r2).abs() / limits.jerk,
+            acceleration: one.at_least(other) / limits.acceleration,
+            jerk: least.at_least(greatest) / limits.jerk,
         }
+    }
+
+    fn ramp_s(&self) -> f32 {
+        self.limits.acceleration / self.limits.jerk
     }
 
     fn span_at(&self, cursor: &CurveCursor, slot: &SlotAt, room: &Use) -> Span {
@@ -397,21 +427,31 @@ impl Course for Curve {
         let [v, a, j] = self.piece(cursor.piece).rates(cursor.time);
         let limits = &self.limits;
         let mut span = Span::WIDE;
-        let later = a + 0.5 * slot_s * r * j;
-        span.add_acceleration(
-            [a, later].map(|a| a * r * r),
-            v,
-            room.acceleration * limits.acceleration,
-        );
+        // The acceleration may change its sign within a slot. r' at the end of the slot is within the limits up to the end of the next one, and
+        // r' at its start, the end of the one before, up to its own end: so is each r' between them.
+        let around = r * around;
+        let next = around + r * slot_s;
+        let most = room.acceleration * limits.acceleration;
+        for speed in [v, fastest_around([v, a, j], next)] {
+            let at = self.accelerations_beside(cursor, [around, next], v);
+            span.add_acceleration(at.map(|a| a * r * r), speed, most);
+        }
         // The speed changes over the time around the place, and the jerk steps.
-        let fastest = fastest_around([v, a, j], r * around);
-        let by_first = 3.0 * a * r;
-        let [before, behind] = self.jerk_beside(cursor, r * around, v);
-        let least = j.at_most(before).at_most(behind);
-        let greatest = j.at_least(before).at_least(behind);
+        let fastest = fastest_around([v, a, j], around);
+        let by_first = self
+            .accelerations_beside(cursor, [around; 2], v)
+            .map(|a| 3.0 * a * r);
+        let [one_slope, other_slope] = by_first;
+        let [before, behind] = self.jerk_beside(cursor, around, v);
+        let least = j.at_most(before).at_most(behind) * r * r * r;
+        let greatest = j.at_least(before).at_least(behind) * r * r * r;
+        let [one, other] = by_first.map(|by_first| by_first * first);
         span.add_jerk(
-            [least, greatest].map(|j| j * r * r * r + by_first * first),
-            [fastest, fastest + by_first * slot_s],
+            [least + one.at_most(other), greatest + one.at_least(other)],
+            [
+                fastest + one_slope.at_most(0.0) * slot_s,
+                fastest + other_slope.at_least(0.0) * slot_s,
+            ],
             room.jerk * limits.jerk,
         );
         span
@@ -419,6 +459,32 @@ impl Course for Curve {
 }
 
 impl Curve {
+    /// Least and greatest acceleration from one time before to another behind a place with this speed.
+    fn accelerations_beside(&self, cursor: &CurveCursor, [before, behind]: [f32; 2], speed: f32) -> [f32; 2] {
+        let piece = self.piece(cursor.piece);
+        let mut range = piece.accelerations(cursor.time - before, cursor.time + behind);
+        let mut add = |[least, greatest]: [f32; 2]| {
+            range = [range[0].at_most(least), range[1].at_least(greatest)];
+        };
+        let moved_mm = to_f32(piece.cruise_q10 - cursor.left_q10) * MM_PER_Q10;
+        let earlier = before - cursor.time;
+        if earlier > 0.0
+            && moved_mm <= 0.0
+            && let Some(index) = cursor.piece.checked_sub(1)
+        {
+            let piece = self.piece(index);
+            add(piece.accelerations(piece.ramp_s - earlier, piece.ramp_s));
+        }
+        let later = cursor.time + behind - piece.ramp_s;
+        if later > 0.0
+            && !self.is_last(cursor.piece)
+            && to_f32(cursor.left_q10) * MM_PER_Q10 <= speed.at_least(piece.to) * later
+        {
+            add(self.piece(cursor.piece + 1).accelerations(0.0, later));
+        }
+        range
+    }
+
     /// Jerk this time before and behind a place with this speed.
     fn jerk_beside(&self, cursor: &CurveCursor, around: f32, speed: f32) -> [f32; 2] {
         let piece = self.piece(cursor.piece);

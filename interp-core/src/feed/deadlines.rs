@@ -1,4 +1,4 @@
-//! What the time of a planning is held against.
+//! Deadlines of the planning of a pass.
 
 /// Periods that a planning and its plan may take.
 #[derive(Clone, Copy, Debug)]

@@ -101,6 +101,14 @@ impl MotionLimits {
         Self::of(feed, axes, inverse_chord, period)
     }
 
+    /// Least time in which an axis reaches its acceleration, s.
+    pub(crate) fn ramp_s(&self) -> f32 {
+        let ramps = self.axes.iter().zip(&self.inverse);
+        ramps.fold(f32::MAX, |least, (axis, inverse)| {
+            least.at_most(axis.acceleration * inverse.jerk)
+        })
+    }
+
     fn of(feed: f32, axes: [AxisMotion; 3], inverse_chord: f32, period: f32) -> Self {
         Self {
             feed,

@@ -29,10 +29,15 @@ const WHOLE_CHANGE: f32 = 2.0;
 const LATENCY_OF_PROFILE: u16 = 3;
 const PROFILE_PLACES: f32 = 2.5;
 const PLACES_FINE: f32 = 1.4;
-/// Least duration of a slot of a profile, s, first and where that fails, and slots of the shortest change that are enough; longest period with profiles, s.
+/// Least duration of a slot of a profile, s, and where that fails.
 const SLOT_MIN: f32 = 2e-3;
 const SLOT_FINE: f32 = 1e-3;
+/// Slots of the shortest change that are enough; fewer than that would be longer than this share of [`Course::ramp_s`], and the acceleration would change its
+/// sign within one. The most.
 const SLOTS_ENOUGH: f32 = 80.0;
+const SLOT_OF_RAMP: f32 = 0.5;
+const SLOTS_MOST: f32 = 250.0;
+/// Longest period with profiles, s.
 const PROFILE_PERIOD_MAX: f32 = 2.5e-3;
 
 /// The same of a pace above 1.
@@ -58,7 +63,7 @@ const SHORT_SEARCHES: u8 = 5;
 /// Searches that find nothing from rest, after which the next plan comes first.
 const STUCK: u8 = 2;
 
-/// Change of the pace that is none.
+/// Changes of the pace below this are ignored.
 const SAME: f32 = 1e-6;
 
 /// A planned motion from rest to rest.
@@ -81,6 +86,9 @@ pub(crate) trait Course {
         false
     }
 
+    /// Least time in which the motion's own acceleration may rise from 0 to its limit, s.
+    fn ramp_s(&self) -> f32;
+
     /// What the room leaves to the derivatives of the pace in a slot of a profile, at the place of its middle.
     fn span_at(&self, cursor: &Self::Cursor, slot: &SlotAt, room: &Use) -> Span;
 }
@@ -102,10 +110,13 @@ pub(crate) struct Pace<C> {
     is_at_start: bool,
     /// Whether a long stop is followed that a search may find a shorter one for.
     is_long_stop: bool,
-    /// The pace above 1 that is wanted, or 1; the one that there is time for; the periods for which none is sought; the greatest of the change that is followed.
+    /// Pace above 1 that is commanded, or 1.
     above: f32,
+    /// Greatest pace for which the next pass is planned in time.
     most: f32,
+    /// Periods until the next search above 1.
     wait: u16,
+    /// Greatest pace of the change being followed.
     ceiling: f32,
     search: Option<Search<C>>,
     /// Searches in a row that found nothing, and that were not complete in time.
@@ -403,7 +414,11 @@ impl<C: Copy> Pace<C> {
         let shortest = Inertia::at(course, at).shortest(self.wanted - pace, self.period);
         let makes_profile = self.makes_profile();
         let finest = self.slot_of(SLOT_FINE);
-        let slot_s = if is_uneven { finest } else { self.slot(shortest) };
+        let slot_s = if is_uneven {
+            finest
+        } else {
+            self.slot(shortest, course.ramp_s())
+        };
         let (least, places) = if makes_profile {
             let share = if is_uneven { PLACES_FINE } else { PROFILE_PLACES };
             (LATENCY_OF_PROFILE, share * shortest / slot_s)
@@ -531,8 +546,10 @@ impl<C: Copy> Pace<C> {
     }
 
     /// Duration of a slot, s: whole periods.
-    fn slot(&self, shortest: f32) -> f32 {
-        self.slot_of(SLOT_MIN.at_least(shortest * (1.0 / SLOTS_ENOUGH)))
+    fn slot(&self, shortest: f32, ramp_s: f32) -> f32 {
+        let wanted = (shortest * (1.0 / SLOTS_ENOUGH)).at_most(SLOT_OF_RAMP * ramp_s);
+        let least = SLOT_MIN.at_least(shortest * (1.0 / SLOTS_MOST));
+        self.slot_of(wanted.at_least(least))
     }
 
     /// Whole periods, s.

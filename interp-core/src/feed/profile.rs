@@ -11,15 +11,15 @@ const SEGMENTS: usize = 64;
 const PART_OF_SEGMENTS: f32 = 1.0 / 64.0;
 /// Most slots of a segment, and of a profile.
 const SLOTS_A_SEGMENT: u32 = 0xff;
-const SLOTS_MAX: u16 = 300;
+const SLOTS_MAX: u16 = 400;
 /// Most slots that a place moves on by at once.
 const SLOTS_A_STEP: u8 = 8;
 /// Part of a slot by which rounding may be short of its end.
 const ROUNDING: f32 = 1e-3;
 /// Difference of r'' from the one that is best, as a share of it, for which a segment goes on.
 const SAME: f32 = 0.08;
-/// How much more that is where there are too many segments, and the most: a difference of all of it is none to begin with. So much less is taken than what is best, as
-/// a part of that difference, so that a segment can go on where the axes leave less.
+/// Factor on [`SAME`] where segments run short, and its greatest value (1 would accept any difference). A new segment takes less than the best r''
+/// by the share [`LESS`] of that difference, so that it can go on where the axes leave less.
 const COARSER: f32 = 2.5;
 const COARSEST: f32 = 0.6;
 const LESS: f32 = 0.5;
@@ -27,16 +27,17 @@ const LESS: f32 = 0.5;
 const COARSE: f32 = 0.3;
 const TAKEN: [f32; 2] = [0.5, 0.75];
 const TAKEN_BEYOND: [f32; 2] = [0.1, 0.3];
-/// Difference of two paces that is none.
+/// Paces that differ by less count as equal.
 const SAME_PACE: f32 = 1e-6;
 /// Pace below 0 that is rounding.
 const PACE_MIN: f32 = -1e-5;
 /// Greatest r'', as a multiple of one over the square of a slot.
 const SECOND_MAX: f32 = 4.0;
-/// Share of the r' that the accelerations allow that is aimed at, and the one down to which a segment goes on.
+/// Share of the r' allowed by the accelerations that is aimed at.
 const AIMED: f32 = 0.985;
-/// Share of it that is rounding and what happens within a slot.
+/// Share of it allowed for rounding and changes within a slot.
 const BEYOND: f32 = 0.004;
+/// Share of it down to which a segment goes on.
 const KEPT: f32 = 0.97;
 /// Greatest r', as a multiple of one over a slot: where the tool hardly moves, speed and acceleration of the plan change much within a slot.
 const FIRST_MAX: f32 = 0.05;
@@ -523,7 +524,8 @@ impl Making {
                 .map(|part| part * best)
                 .find(|second| is_early(*second))
         };
-        let second = wanted.unwrap_or(rest);
+        // Where the axes ask for more than the parabola, it ends later.
+        let second = wanted.unwrap_or(rest.at_most((allowed - first) / slot_s));
         // On the parabola r'' stays what it is, but for rounding.
         let is_same = (second - last).abs() <= 1e-3 * last.abs() && (low..=high).contains(&last);
         let second = if is_same { last } else { second };

@@ -91,6 +91,10 @@ impl Course for Road<'_> {
         self.plan(cursor).is_uneven(cursor)
     }
 
+    fn ramp_s(&self) -> f32 {
+        self.now.ramp_s()
+    }
+
     fn span_at(&self, cursor: &Cursor, slot: &SlotAt, room: &Use) -> Span {
         if self.is_beyond(cursor) || (cursor.is_next && slot.r > self.next_pace * 1.001) {
             return Span::NONE;

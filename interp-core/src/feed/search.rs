@@ -67,7 +67,7 @@ impl Inertia {
         }
     }
 
-    /// Duration of the shortest quintic by so much, s.
+    /// Shortest duration of a quintic that changes the pace by `apart`, s.
     pub(super) fn shortest(&self, apart: f32, period: f32) -> f32 {
         let apart = apart.abs().at_least(0.01);
         (1.9 * apart * self.by_first)

@@ -1,6 +1,6 @@
 //! Jobs that are larger than the store: loaded while they run, row by row.
 //!
-//! A row is the patches of one side span. The store keeps a ring of rows: the one that the tool is on and as many after it as fit. What is not patches stays at its
+//! A row is the patches of one side span. The store keeps a ring of rows: the one that the tool is on and as many after it as fit. All other words stay at its
 //! start. The words of a streamed job, in order:
 //!
 //! | words | content |
@@ -17,7 +17,7 @@
 //! **The window.** [`Header::window`] is the number of rows that is certain to be in the ring: it belongs to the job, so that the passes do not depend on the
 //! ring's size. What is planned for a pass looks at rows up to `window - 1`
 //! after the first one that is needed then: the pass's own, that of the pass before, or, where the tool goes along the boundary from one to the other, that of the pass before
-//! that (`pass/row_history.rs`). Where an interval reaches farther it is cut short: none whose three times are in a row.
+//! that (`pass/row_history.rs`). Where an interval reaches farther it is cut short; an interval that fits three times into one row never is.
 //!
 //! **Turns.** Where turns lead from pass to pass the tool is not at rest, so nothing can be waited for. At a rest all rows of the window are asked for, and turns lead on for as
 //! long as these last; then the tool rests at the end of a pass. So a job with turns rests more often than one that is no stream, by its window alone.

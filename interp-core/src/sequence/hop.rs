@@ -58,6 +58,10 @@ impl Course for Curves {
         most
     }
 
+    fn ramp_s(&self) -> f32 {
+        (self.curves.iter()).fold(f32::MAX, |least, curve| least.at_most(curve.ramp_s()))
+    }
+
     fn span_at(&self, cursor: &HopCursor, slot: &SlotAt, room: &Use) -> Span {
         let mut most = Span::WIDE;
         for (place, curve) in cursor.curves.iter().zip(&self.curves) {

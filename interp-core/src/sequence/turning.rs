@@ -11,7 +11,7 @@ use crate::math::number::Bounded;
 use crate::pass::run::Run;
 use crate::sample::Sample;
 
-/// Change of the pace that is none.
+/// Changes of the pace below this are ignored.
 const SAME: f32 = 1e-4;
 
 /// Where a plan's arc is: in the half turn before the pass or behind it at this arc of the turn, or on the pass; units of 2^-10 nm.

@@ -331,6 +331,10 @@ impl Course for Plan {
         self.is_near_end_at_speed(arc_nm, UNEVEN_NM)
     }
 
+    fn ramp_s(&self) -> f32 {
+        self.limits.ramp_s()
+    }
+
     fn span_at(&self, cursor: &Cursor, slot: &SlotAt, room: &Use) -> Span {
         self.span_of(&self.limits, cursor, slot, room)
     }

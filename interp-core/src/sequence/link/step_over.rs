@@ -25,7 +25,7 @@ const BEND_JERK_SHARE: f32 = 0.6;
 
 /// Knots of a step-over that are looked at.
 const KNOTS_MAX: u16 = 4;
-/// What the greatest product of speed and acceleration of a rise is less than that of their greatest values, where the jerk alone bounds it: 1 - (2/3)^(3/2).
+/// In a rise bounded by jerk alone, max(v a) is smaller than max(v) max(a) by this share: 1 - (2/3)^(3/2).
 const V_TIMES_A: f32 = 0.456;
 /// Share of the jerk that a jump of the direction may take in the periods that see it.
 const JUMP_JERK_SHARE: f32 = 0.1;
