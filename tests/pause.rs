@@ -239,6 +239,33 @@ fn a_run_that_begins_within_a_pass_goes_on_along_it() {
     }
 }
 
+/// A place less than a nanometre before the end of a pass is that end: the run begins with the next pass. The planning of the rest had no end.
+#[test]
+fn a_run_that_begins_at_the_end_of_a_pass_begins_with_the_next() {
+    for (name, job) in jobs() {
+        let (whole, _) = run_from(&job, at_pass(1));
+        let on_pass = |sample: &&Sample| sample.pass == 1 && sample.state == State::Running;
+        let pass: Vec<Sample> = whole.iter().filter(on_pass).copied().collect();
+        let [start, near_end] = [pass[0].path, pass[pass.len() - 2].path];
+        let is_back = (near_end.span, near_end.fraction) < (start.span, start.fraction);
+        let path = SpanParameter {
+            span: near_end.span,
+            fraction: if is_back { 1 } else { u64::MAX - 1 },
+        };
+        let (samples, _) = run_from(&job, RunStart { pass: 1, path });
+        let from_next = ends(&run_from(&job, at_pass(2)).0);
+        let got = ends(&samples);
+        assert_eq!(got.len(), from_next.len(), "{name}");
+        for (got, want) in got.iter().zip(&from_next) {
+            assert_eq!(
+                (got[0].pass, got[0].cl_nm),
+                (want[0].pass, want[0].cl_nm),
+                "{name}"
+            );
+        }
+    }
+}
+
 /// A linear congruential generator.
 struct Random(u64);
 

@@ -40,6 +40,7 @@
     reason = "ranges are checked before each cast"
 )]
 
+use crate::job::{WIDTH_MAX, WIDTH_MIN};
 use crate::surface::{Edges, PolynomialRecord, RationalRecord, RevolvedRecord, SHIFT_MAX};
 use core::fmt;
 use libm::round;
@@ -56,8 +57,10 @@ pub enum EncodeError {
     TooLarge,
     /// The origin is outside ±2.147 m.
     TooFar,
-    /// The weights vary more than 4 : 1 over the patch, or are not positive. Split the patch.
+    /// The weights vary more than 4 : 1 over the patch, are not positive, or their derivatives exceed the range of the record. Split the patch.
     Weights,
+    /// The width of a span is outside [`WIDTH_MIN`] to [`WIDTH_MAX`].
+    Width,
     /// A flagged boundary does not collapse into a point, or more boundaries are flagged than a patch may have.
     NotAPole,
     /// The extent of the angle is outside 0 (exclusive) to one turn.
@@ -70,7 +73,10 @@ impl fmt::Display for EncodeError {
             Self::NotFinite => "a coefficient is not a finite number",
             Self::TooLarge => "a patch is larger than about 0.5 m",
             Self::TooFar => "a patch is further than 2.147 m from the origin",
-            Self::Weights => "the weights of a patch vary by more than 4 : 1, or are not positive",
+            Self::Weights => {
+                "the weights of a patch vary by more than 4 : 1, are not positive, or vary too fast"
+            }
+            Self::Width => "the width of a span is outside 1e-9 to 1e9",
             Self::NotAPole => "a boundary that should be a point is none",
             Self::Extent => "the angle's extent is not above 0 and at most a turn",
         })
@@ -115,13 +121,13 @@ fn transpose(c: &Bicubic) -> Bicubic {
 /// The word that encodes a span's width, in units of the surface's parameter.
 ///
 /// # Errors
-/// [`EncodeError::NotFinite`] where the width is not above 0 as an f32.
+/// [`EncodeError::Width`] where the width as an f32 is outside [`WIDTH_MIN`] to [`WIDTH_MAX`].
 pub fn width(width: f64) -> Result<i32, EncodeError> {
     let width = width as f32;
-    if width > 0.0 && width.is_finite() {
+    if (WIDTH_MIN..=WIDTH_MAX).contains(&width) {
         Ok(width.to_bits().cast_signed())
     } else {
-        Err(EncodeError::NotFinite)
+        Err(EncodeError::Width)
     }
 }
 
@@ -269,8 +275,18 @@ pub fn rational(c: &[Bicubic; 4], edges: Edges) -> Result<RationalRecord, Encode
     let is_valid = |record: &RationalRecord, edges| {
         RationalRecord::check(&RationalRecord { edges, ..*record }.to_words()).is_ok()
     };
-    // The weights' Bernstein coefficients may leave the range although their values do not.
-    finest(quantised, is_valid, edges, EncodeError::Weights)
+    // The weights' Bernstein coefficients and derivatives may leave the range although their values do not.
+    let of_weights = |record: &RationalRecord| {
+        let mut record = *record;
+        let [numerators @ .., _] = &mut record.coefficients;
+        *numerators = [[[0; 4]; 4]; 3];
+        is_valid(&record, Edges::default())
+    };
+    let otherwise = match quantised(0) {
+        Some(record) if !of_weights(&record) => EncodeError::Weights,
+        _ => EncodeError::TooLarge,
+    };
+    finest(quantised, is_valid, edges, otherwise)
 }
 
 fn evaluate(c: &Bicubic, u: f64, v: f64) -> f64 {
@@ -336,4 +352,43 @@ pub fn revolved(
         }
     }
     Err(EncodeError::TooLarge)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A flat square of this size, mm, with these weights along the path at -1/2 and 1/2.
+    fn flat(size: f64, [from, to]: [f64; 2]) -> [Bicubic; 4] {
+        let mut patch = [[[0.0; 4]; 4]; 4];
+        let (mean, slope) = (0.5 * (from + to), to - from);
+        // Numerators: the coordinate times the weight.
+        patch[3][0][0] = mean;
+        patch[3][1][0] = slope;
+        patch[0][1][0] = size * mean;
+        patch[0][2][0] = size * slope;
+        patch[1][0][1] = size * mean;
+        patch[1][1][1] = size * slope;
+        patch
+    }
+
+    #[test]
+    fn a_refused_patch_names_its_cause() {
+        let edges = Edges::default();
+        assert!(rational(&flat(10.0, [1.0, 1.0]), edges).is_ok());
+        assert!(rational(&flat(10.0, [1.0, 3.0]), edges).is_ok());
+        for (size, weights, error) in [
+            (10_000.0, [1.0, 1.0], EncodeError::TooLarge),
+            (10_000.0, [1.0, 1.2], EncodeError::TooLarge),
+            (10.0, [1.0, 6.0], EncodeError::Weights),
+        ] {
+            assert_eq!(
+                rational(&flat(size, weights), edges),
+                Err(error),
+                "{size} {weights:?}"
+            );
+        }
+        assert_eq!(width(1e-20), Err(EncodeError::Width));
+        assert!(width(1e-9).is_ok() && width(1e9).is_ok());
+    }
 }

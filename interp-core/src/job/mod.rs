@@ -5,10 +5,14 @@
 //! | words | content |
 //! |---|---|
 //! | `side_spans` | width of each side span in units of the surface's side parameter, f32 bits |
-//! | `path_spans` | width of each path span, f32 bits (reported only; the step along the path does not use it) |
+//! | `path_spans` | width of each path span, f32 bits; the step along a path does not use it, [`Spacing::Constant`] does |
 //! | of the records | [`SurfaceKind::Polynomial`], [`SurfaceKind::Rational`]: one record per patch, path index fastest; [`SurfaceKind::RevolvedAlongProfile`], [`SurfaceKind::RevolvedAroundAxis`]: one record |
 //! | with a region | its cells and edges: [`region`] |
 //! | [`Header::links`] | for each pass from the second one on: how the tool goes to it, [`links`] |
+//!
+//! Widths are those of a surface whose derivatives are continuous from span to span, in proportion to the spans of a knot vector: between unequal
+//! patches of equal widths passes would be too far apart. [`WIDTH_MIN`] to [`WIDTH_MAX`]. The core does not check that patches join: a gap is a jump of
+//! the tool.
 //!
 //! Those of a job that is loaded while it runs have another order: [`stream`].
 //!
@@ -37,6 +41,11 @@ pub const fn patches_max(kind: SurfaceKind, store_words: usize) -> usize {
     };
     store_words.saturating_sub(1) / (words + 1)
 }
+
+/// Least and greatest width of a span: in their range the spacing of passes keeps its digits.
+pub const WIDTH_MIN: f32 = 1e-9;
+/// See [`WIDTH_MIN`].
+pub const WIDTH_MAX: f32 = 1e9;
 
 /// Maximum spans of a surface in one direction. Bounds every loop over spans.
 pub const SPANS_MAX: u16 = 1_024;

@@ -6,7 +6,7 @@ use crate::job::links::Link;
 use crate::job::region::{EDGE_WORDS, EDGES_A_RECORD, FirstLine, RegionCheck, RegionWords, ScanLine};
 use crate::job::stations::{SPANS_MAX as FRONT_SPANS_MAX, Stations};
 use crate::job::stream::{RecordCopy, Rows, RowsNeeded};
-use crate::job::{AxisLimits, Header, SurfaceKind, width_words};
+use crate::job::{AxisLimits, Header, SurfaceKind, WIDTH_MAX, WIDTH_MIN, width_words};
 use crate::surface::{
     POLYNOMIAL_WORDS, PolynomialRecord, RATIONAL_WORDS, REVOLVED_WORDS, RationalRecord, RevolvedRecord,
     split_patch,
@@ -513,7 +513,7 @@ impl<'a> Job<'a> {
         let count = width_words(self.header.path_spans, self.header.side_spans) as usize;
         for word in self.store.iter().take(count) {
             let width = f32::from_bits(word.cast_unsigned());
-            if !(width > 0.0 && width.is_finite()) {
+            if !(WIDTH_MIN..=WIDTH_MAX).contains(&width) {
                 return Err(Fault::new(FaultKind::BadHeader, width));
             }
         }

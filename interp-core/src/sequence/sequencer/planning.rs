@@ -410,6 +410,15 @@ impl Sequencer {
             self.pending = self.lookahead.begin_within(path, next).err();
         } else if next.point {
             self.planning = Planning::Complete;
+        } else if next.plan.stations.length_nm() == 0 {
+            let [at_boundary, _] = next.route.reach_boundaries(job);
+            if next.pass > self.first.pass || at_boundary {
+                self.pending = Some(Fault::new(FaultKind::PatchTooShort, 0.0));
+            } else {
+                // The run begins at the end of the pass.
+                self.first.pass += 1;
+                self.skip(run);
+            }
         } else {
             self.begin_feed(job, axes, job.header.feed_mm_s * self.feed_factor.at_least(1.0));
         }
