@@ -50,6 +50,51 @@ fn check(name: &str, job: &Job, own: f64) {
     );
 }
 
+/// A smooth cubic surface that is split at this share of v, both parts between equally long spans of knots: the parameter's speed jumps there.
+fn split_at(share: f64) -> Job {
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../jobs/plate_machine.toml");
+    let mut job = job_file::load(&path).unwrap();
+    let mix = |a: [f64; 4], b: [f64; 4]| std::array::from_fn(|k| (1.0 - share) * a[k] + share * b[k]);
+    let row = |i: usize| {
+        let (x, along) = (40.0 * i as f64 / 3.0, [0.0, 3.0, -2.0, 1.0][i]);
+        let z = [1.0, -2.0, 3.0, 0.0].map(|across| along + across);
+        let mut left: Vec<[f64; 4]> = (0..4).map(|j| [x, 40.0 * j as f64 / 3.0, z[j], 1.0]).collect();
+        // De Casteljau: the first of each round are the poles before the split, the last ones those behind it.
+        let (mut before, mut behind) = (vec![left[0]], vec![left[3]]);
+        while left.len() > 1 {
+            left = left.windows(2).map(|pair| mix(pair[0], pair[1])).collect();
+            before.push(left[0]);
+            behind.push(left[left.len() - 1]);
+        }
+        before.extend(behind.iter().rev().skip(1));
+        before
+    };
+    job.surface = SurfaceSpec::Nurbs(NurbsSpec {
+        degree: [3, 3],
+        knots_u: vec![0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0],
+        knots_v: vec![0.0, 0.0, 0.0, 0.0, 0.5, 0.5, 0.5, 1.0, 1.0, 1.0, 1.0],
+        poles_mm: (0..4).map(row).collect(),
+        rational: false,
+    });
+    (job.along, job.radius_mm, job.scallop_mm) = (Along::U, 3.0, 0.05);
+    job
+}
+
+/// Steps over a knot where only the parametrisation jumps are as long as elsewhere: in the knots' own parameter the gap before one at a tenth was nine times
+/// as wide, and the height 57 times the limit. There are as many passes as on the surface without the knot.
+#[test]
+fn jumps_of_the_parametrisation() {
+    let whole = follow(&split_at(0.5)).track.passes.len();
+    for share in [0.03, 0.1, 0.2, 0.7, 0.97] {
+        let job = split_at(share);
+        let followed = follow(&job);
+        let (excess, error) = excess(&job, &measured_of(&job, &followed));
+        assert!(excess <= error + 1e-4, "{share}: {excess} above the limit");
+        assert_eq!(followed.track.passes.len(), whole, "{share}");
+        assert_eq!(followed.oracle.schedule().unwrap().len(), whole, "{share}");
+    }
+}
+
 /// A plane between a straight side and a parabola whose vertex is at this share of the passes, a knot in their middle: passes are closest together there.
 fn widest_at(vertex: f64, limits: Option<AxisLimits>) -> Job {
     let job = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../jobs/plate_machine.toml");

@@ -6,6 +6,7 @@
 //! measured independently from the swept ball.
 
 use super::contact::{Oracle, OracleError};
+use super::smooth::SmoothParameter;
 use job::{Along, Spacing};
 
 /// Points scanned per span for the least interval, and the least number of points per pass.
@@ -65,19 +66,22 @@ impl Oracle {
     fn schedule_of_one(&self) -> Result<Vec<ScheduledPass>, OracleError> {
         let [start, _] = self.pass_range();
         let end = self.last_line();
+        let smooth = SmoothParameter::new(self, self.across());
+        // In the smooth parameter.
         let mut passes = Vec::new();
         let mut steps = Vec::new();
         let Some(mut side) = self.next_line(start) else {
             return Ok(passes);
         };
         while passes.len() < PASSES_MAX {
-            let before: Vec<f64> = steps.iter().rev().take(2).copied().collect();
+            let scale = smooth.scale(side);
+            let before: Vec<f64> = steps.iter().rev().take(2).map(|step| step / scale).collect();
             let interval = match self.spacing {
                 Spacing::FirstOrder => self.least_interval(side)?,
-                Spacing::Exact | Spacing::Constant(_) => self.exact_interval(side, &before)?,
+                Spacing::Exact | Spacing::Constant(_) => self.exact_interval(side, &before, &smooth)?,
             };
-            steps.push(interval);
-            let interval = self.beside_point(side, interval);
+            steps.push(interval * scale);
+            let interval = self.beside_point(side, interval, smooth.distance(side, end));
             let intervals = self.certain_intervals(side).into_iter();
             passes.extend(intervals.map(|ends| ScheduledPass { side, ends, interval }));
             if side >= end {
@@ -86,10 +90,11 @@ impl Oracle {
             // Lines without an interval are left out; where the line meets nothing at all, the region begins again.
             let mut next = side;
             loop {
-                if next + interval <= next {
+                let behind = smooth.advanced(next, interval * scale / smooth.scale(next));
+                if behind <= next {
                     return Err(OracleError::TooManyPasses);
                 }
-                next += interval;
+                next = behind;
                 if end - next <= BOUNDARY_SHARE * interval {
                     next = end;
                 }
@@ -107,13 +112,14 @@ impl Oracle {
     }
 
     /// A step beside a boundary that is cut with one normal: half of it, from the point and to it.
-    fn beside_point(&self, side: f64, step: f64) -> f64 {
+    ///
+    /// `room`: distance to the last line.
+    fn beside_point(&self, side: f64, step: f64, room: f64) -> f64 {
         let one_normal = self.has_limits && self.spacing == Spacing::Exact;
         let [start, end] = self.pass_range();
         if !one_normal {
             return step;
         }
-        let room = end - side;
         if side == start && self.is_point(start) {
             ONE_SIDED * step
         } else if step >= room && room > 0.5 * step && self.is_point(end) {
@@ -123,11 +129,16 @@ impl Oracle {
         }
     }
 
-    /// Largest step from the pass at `side` to the next; `before`: steps of the previous passes, the last one first.
+    /// Largest step from the pass at `side` to the next, in units of the side parameter there; `before`: steps of the previous passes, the last one first.
     ///
     /// # Errors
     /// As [`Oracle::schedule`].
-    pub fn exact_interval(&self, side: f64, before: &[f64]) -> Result<f64, OracleError> {
+    fn exact_interval(
+        &self,
+        side: f64,
+        before: &[f64],
+        smooth: &SmoothParameter,
+    ) -> Result<f64, OracleError> {
         let end = self.last_line();
         let places = self.places_on(side);
         let here = self.greatest_density(side, &places)?;
@@ -142,8 +153,12 @@ impl Oracle {
             [last, ..] if last.is_finite() => last,
             _ => first,
         };
-        let distance = expected.min(end - side);
-        let beside = |share: f64| self.greatest_density(side + share * distance, &places);
+        let distance = expected.min(smooth.distance(side, end));
+        let beside = |share: f64| -> Result<f64, OracleError> {
+            let line = smooth.advanced(side, share * distance);
+            let scale = smooth.scale(line) / smooth.scale(side);
+            Ok(self.greatest_density(line, &places)? / (scale * scale))
+        };
         let (half, whole) = (beside(0.5)?, beside(1.0)?);
         let breaks = self.surface.breaks(self.across());
         let has_knot = |from: f64, to: f64| {
@@ -151,8 +166,8 @@ impl Oracle {
                 .iter()
                 .any(|knot| from < *knot && *knot <= to && *knot < end)
         };
-        let middle = side + 0.5 * distance;
-        let knots = [has_knot(side, middle), has_knot(middle, side + distance)];
+        let [middle, whole_line] = [0.5, 1.0].map(|share| smooth.advanced(side, share * distance));
+        let knots = [has_knot(side, middle), has_knot(middle, whole_line)];
         let mean = mean_density(here, half, whole, knots);
         // x^2 (1 + rise x) = 1, in units of the first-order step.
         let rise = (mean / here - 1.0) * first / distance;

@@ -1,5 +1,5 @@
-//! A parameter whose spans have widths for which the first derivative is continuous over the knots: passes of constant scallop height are smooth in it, also where the
-//! surface's own parametrisation jumps.
+//! A parameter whose spans have widths for which the first derivative is continuous over the knots, also where the surface's own parametrisation jumps:
+//! passes of constant scallop height are smooth in it, and steps to straight ones are continuous.
 
 use job::Along;
 
@@ -49,7 +49,7 @@ impl SmoothParameter {
             let place = spans.last().map_or(*start, |span| span.at(*start));
             if !spans.is_empty() {
                 let ratio = speed(start + beside) / speed(start - beside);
-                if (ratio - 1.0).abs() > JUMP {
+                if ratio.is_finite() && (ratio - 1.0).abs() > JUMP {
                     scale *= ratio;
                 }
             }
@@ -73,6 +73,31 @@ impl SmoothParameter {
     pub(super) fn own(&self, place: f64) -> (f64, f64) {
         let span = self.span(|span| span.place <= place);
         (span.start + (place - span.place) / span.scale, span.scale)
+    }
+
+    /// Change of the smooth parameter per unit of the own at a place; at a knot, behind it.
+    pub(super) fn scale(&self, at: f64) -> f64 {
+        self.span(|span| span.start <= at).scale
+    }
+
+    /// The place at a distance behind another; in units of the own parameter there.
+    pub(super) fn advanced(&self, from: f64, distance: f64) -> f64 {
+        let span = self.span(|span| span.start <= from);
+        let to = from + distance;
+        if self.scale(to) == span.scale {
+            return to;
+        }
+        self.own(span.at(from) + distance * span.scale).0
+    }
+
+    /// Distance from one place to another, in units of the own parameter at the first.
+    pub(super) fn distance(&self, from: f64, to: f64) -> f64 {
+        let scale = self.scale(from);
+        if self.scale(to) == scale {
+            to - from
+        } else {
+            (self.of(to) - self.of(from)) / scale
+        }
     }
 
     /// The middle of the whole range.

@@ -292,10 +292,10 @@ impl Verifier {
             return;
         }
         let last = self.cell.last_line();
-        let interval = before.least_interval.min(last - before.side);
+        let interval = before.least_interval.min(self.across(before.side, last));
         if self.oracle.spacing == Spacing::FirstOrder && last - side > self.oracle.near_side() {
             // The line is rounded down to a place.
-            let error = side - (before.side + interval);
+            let error = self.across(before.side, side) - interval;
             let error = if error < 0.0 {
                 (error + self.oracle.near_side()).min(0.0)
             } else {
@@ -303,7 +303,13 @@ impl Verifier {
             };
             self.report.side_step.add(error / interval, spot);
         }
-        self.close_scallop(&before, side - before.side);
+        self.close_scallop(&before, self.across(before.side, side));
+    }
+
+    /// Distance between two lines, in units of the side parameter at the first.
+    fn across(&self, from: f64, to: f64) -> f64 {
+        let [_, smooth] = &self.smooth;
+        smooth.distance(from, to)
     }
 
     /// Path parameters where a pass starts and ends.
@@ -340,13 +346,12 @@ impl Verifier {
                 }
             }
             Some(before) => {
-                let interval = before.least_interval.min(last - before.side);
+                let apart = self.across(before.side, side);
+                let interval = before.least_interval.min(self.across(before.side, last));
                 if self.oracle.spacing == Spacing::FirstOrder {
-                    self.report
-                        .side_step
-                        .add((side - (before.side + interval)) / interval, spot);
+                    self.report.side_step.add((apart - interval) / interval, spot);
                 }
-                self.close_scallop(&before, side - before.side);
+                self.close_scallop(&before, apart);
                 if !before.finished || sample.pass != self.report.passes {
                     self.report.off_boundary += 1;
                 }

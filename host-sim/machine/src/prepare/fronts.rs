@@ -52,15 +52,12 @@ pub(super) fn check(job: &Job, prepared: &Prepared) -> Result<(), JobError> {
     Ok(())
 }
 
-/// Widths of the spans for which the surface's first derivatives are continuous, so that a front crosses a knot without a bend where only the parametrisation jumps, by one factor
-/// all along the knot.
+/// Widths of the spans for which the surface's first derivatives are continuous where only the parametrisation jumps at a knot, by one factor all
+/// along it: a front crosses it without a bend, and a straight pass before it is as far from the next one as it should be.
 ///
 /// # Errors
-/// A knot at which there is none: the tangent plane jumps, or the factor is not the same all along.
+/// With passes of constant scallop height, a knot at which there is no such factor: the tangent plane jumps, or the factor is not the same all along.
 pub(super) fn smooth_widths(job: &Job, prepared: &mut Prepared) -> Result<(), JobError> {
-    if !job.spacing.is_constant() {
-        return Ok(());
-    }
     let surface = SurfaceEvaluator::new(&job.surface);
     let other = |along| match along {
         job::Along::U => job::Along::V,
@@ -72,23 +69,28 @@ pub(super) fn smooth_widths(job: &Job, prepared: &mut Prepared) -> Result<(), Jo
     ];
     let mut words = Vec::new();
     for (along, own, across) in axes {
-        match smooth(&surface, along, &own.breaks, &across.breaks) {
-            Ok(widths) => words.extend(super::width_words(job, widths.into_iter())?),
-            Err(crease) => return Err(job.origin.error("cut.spacing", crease, REMEDY)),
+        let (widths, crease) = smooth(&surface, along, &own.breaks, &across.breaks);
+        if let Some(knot) = crease.filter(|_| job.spacing.is_constant()) {
+            let name = along.name();
+            let what = format!(
+                "passes of constant scallop height need a tangent plane that is continuous, but the derivative along {name} jumps at {name} = {knot}"
+            );
+            return Err(job.origin.error("cut.spacing", what, REMEDY));
         }
+        words.extend(super::width_words(job, widths.into_iter())?);
     }
     prepared.words.splice(..words.len(), words);
     Ok(())
 }
 
-/// Widths of the spans between knots of one parameter; `across`: those of the other.
+/// Widths of the spans between knots of one parameter, and the first knot at which the derivative jumps by more than one factor; `across`: knots of the
+/// other parameter.
 fn smooth(
     surface: &SurfaceEvaluator,
     along: job::Along,
     knots: &[f64],
     across: &[f64],
-) -> Result<Vec<f64>, String> {
-    let name = along.name();
+) -> (Vec<f64>, Option<f64>) {
     let [low, high] = [across[0], across[across.len() - 1]];
     let width = knots[knots.len() - 1] - knots[0];
     let derivative = |knot: f64, k: u32| {
@@ -100,30 +102,28 @@ fn smooth(
     };
     let mut scale = 1.0;
     let mut widths = vec![knots[1] - knots[0]];
+    let mut crease = None;
     for ends in knots[1..].windows(2) {
         let sides = |k: u32| [-CREASE_STEP, CREASE_STEP].map(|step| derivative(ends[0] + step * width, k));
         let [before, after] = sides(CREASE_POINTS / 2);
         let ratio = after.length() / before.length();
-        let factor = if (ratio - 1.0).abs() > CREASE_MAX {
+        let factor = if ratio.is_finite() && (ratio - 1.0).abs() > CREASE_MAX {
             ratio
         } else {
             1.0
         };
-        for k in 0..CREASE_POINTS {
+        let is_smooth = (0..CREASE_POINTS).all(|k| {
             let [before, after] = sides(k);
             let before = before * factor;
-            let is_smooth = before.distance(after) <= CREASE_MAX * before.length().max(after.length());
-            if !is_smooth {
-                return Err(format!(
-                    "passes of constant scallop height need a tangent plane that is continuous, but the derivative along {name} jumps at {name} = {}",
-                    ends[0]
-                ));
-            }
+            before.distance(after) <= CREASE_MAX * before.length().max(after.length())
+        });
+        if !is_smooth {
+            crease = crease.or(Some(ends[0]));
         }
         scale *= factor;
         widths.push((ends[1] - ends[0]) * scale);
     }
-    Ok(widths)
+    (widths, crease)
 }
 
 /// Whether a region reaches to a side boundary that is a single point, where its passes do not begin there.

@@ -92,8 +92,8 @@ impl Prepared {
             .words
             .get(span)
             .map(|word| f32::from_bits(word.cast_unsigned()));
-        match (self.header.spacing.is_constant(), own, word) {
-            (true, Some([start, end]), Some(width)) => {
+        match (own, word) {
+            (Some([start, end]), Some(width)) => {
                 #[allow(clippy::cast_possible_truncation, reason = "the machine's own precision")]
                 let unit = (end - start) as f32 / width;
                 unit
