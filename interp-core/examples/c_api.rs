@@ -130,7 +130,7 @@ pub unsafe extern "C" fn isofeed_load(
     code(load())
 }
 
-/// One period: executes a command (0 none, 1 start, 2 hold, 3 resume, 4 abort, 5 stop) and writes the sample; the code of the fault where
+/// One period: executes a command (0 none, 1 start, 2 hold, 3 resume, 4 abort, 5 stop, 6 pause) and writes the sample; the code of the fault where
 /// the machine stands with one.
 ///
 /// # Safety

@@ -83,7 +83,8 @@ impl Command {
 pub struct Inputs {
     /// A new command.
     pub command: Option<Command>,
-    /// Feed override, percent, 0 to [`OVERRIDE_MAX_PERCENT`]; more counts as that. Only on a machine with limits.
+    /// Feed override, percent, 0 to [`OVERRIDE_MAX_PERCENT`]; more counts as that. Only on a machine with limits. Up to 100 % it also scales links and retract: at 0 % nothing
+    /// moves, and a stop does not end.
     pub feed_override: u8,
 }
 

@@ -30,9 +30,9 @@ pub enum FaultKind {
     /// 4 : 1, or a boundary flagged as a pole does not collapse; or edges of the region are not in order, outside of the surface, not closed, or too many on
     /// one line. Value: the record's index: patches, then portions of eight edges; the pass where there are too many on a line.
     BadPatch = 9,
-    /// The job's data are incomplete, or their length is not the one that the header implies. Value: the wrong number of words or offset.
+    /// The job's data are incomplete, a record was not checked, or their length is not the one that the header implies. Value: the wrong number of words or offset.
     BadLength = 10,
-    /// A request that does not fit the state, for instance loading while a job runs. Value: the state's code.
+    /// A request that does not fit the state, for instance loading while a job runs. Value: the state's code; of a run that was to begin at a place on no pass, that pass.
     WrongState = 11,
     /// A tick of the sample timer was missed. Value: ticks missed.
     DeadlineMissed = 12,

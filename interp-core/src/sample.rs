@@ -138,9 +138,10 @@ pub struct Sample {
     pub path: SpanParameter,
     /// Side parameter: constant on a pass, unless the passes are of constant scallop height.
     pub side: SpanParameter,
-    /// Commanded feed of the cutter contact along the surface, mm/s.
+    /// Commanded feed of the cutter contact along the surface, mm/s; in [`State::Linking`] the speed of the ball's centre. Without axis limits it stays the programmed one at a
+    /// standstill.
     pub feed_mm_s: f32,
-    /// Cutter contact, nm.
+    /// Cutter contact, nm; in [`State::Linking`] the ball's centre.
     pub cc_nm: [i32; 3],
     /// Cutter location (ball centre), nm: the axes' commanded position.
     pub cl_nm: [i32; 3],

@@ -65,7 +65,8 @@ impl<S> Interpolator<S> {
 impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
     /// Where the next run begins, of a job with axis limits; at the start of the job at power-up, after each start and each load. The passes before are skipped in
     /// the planning while the tool stands: those from there on are the same as in a run of the whole job. On a place within a pass the tool begins at rest, with that
-    /// place's sample, and goes on along the same path.
+    /// place's sample, and goes on along the same path; from the end of a pass, with the next one. A place that is on no pass is a fault of the run, [`FaultKind::WrongState`](crate::FaultKind::WrongState)
+    /// with the pass.
     pub const fn begin_at(&mut self, start: RunStart) {
         self.motion.sequencer.begin_at(start);
     }
@@ -317,7 +318,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
     }
 
     /// The planning of one period: a fixed portion of work, 28 000 cycles of a Cortex-M4F at most. To be called once after each tick and before the
-    /// next, on a board from a task of lower priority than the tick's. The samples depend on the number of calls between two ticks: with one after each,
+    /// next, on a board from a task of lower priority than the tick's, under a lock that keeps the tick from preempting it. The samples depend on the number of calls between two ticks: with one after each,
     /// they are the same on every machine. Does nothing where [`Self::has_to_plan`] is false. A fault of the surface ahead is reported by the tick that
     /// reaches it.
     #[inline(always)]

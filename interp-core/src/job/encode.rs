@@ -53,7 +53,7 @@ pub type Bicubic = [[f64; 4]; 4];
 pub enum EncodeError {
     /// A coefficient or range is not a finite number.
     NotFinite,
-    /// Positions or derivatives of the patch exceed an i32 of nanometres (patches above about 0.5 m). Split the patch.
+    /// Positions or derivatives of the patch exceed an i32 of nanometres: curved patches above about 0.5 m, flat ones above 2 m. Split the patch.
     TooLarge,
     /// The origin is outside ±2.147 m.
     TooFar,

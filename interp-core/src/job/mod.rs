@@ -123,7 +123,8 @@ pub enum Spacing {
     ConstantFromMiddle = 3,
     /// The same from the last side boundary to the first.
     ConstantFromEnd = 4,
-    /// As [`Self::Exact`], where the last side boundary is a single point: within axis limits it is one sample with one normal, and the step to it is half as long.
+    /// As [`Self::Exact`], where the last side boundary is a single point: within axis limits it is one sample with one normal, and the step to it is half as long. With [`Self::Exact`] there the crest beside the point may be
+    /// four times the limit.
     ExactToPoint = 5,
 }
 
@@ -216,7 +217,7 @@ pub struct Header {
     pub side_spans: u16,
     /// Ball radius r, mm, above 0 and at most 1000.
     pub ball_radius_mm: f32,
-    /// Feed of the cutter contact along the surface, mm/s, 0.001 to 10 000.
+    /// Feed of the cutter contact along the surface, mm/s, 0.001 to 10 000; with axis limits at most [`STEP_MAX_MM`] a period at twice the feed.
     pub feed_mm_s: f32,
     /// Scallop height limit h, mm, above 0, at most the ball radius.
     pub scallop_mm: f32,

@@ -5,7 +5,9 @@ use crate::fault::{Fault, FaultKind, Result};
 /// Maximum shift: units of 2^-12 nm, finer than any application requires.
 pub const SHIFT_MAX: u8 = 12;
 
-/// The boundary of a patch that collapses into a point; at most one.
+/// The boundary of a patch that collapses into a point; at most one, because the polynomials are divided by the distance from it. It has to be flagged: the normal
+/// beside one that is not loses its digits, and the run ends in [`FaultKind::DegenerateSurface`] on it. A flagged one has to be a point exactly: all its coefficients
+/// (of a rational patch its numerators, from the point as the origin) vanish.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Edges {
     /// The boundary at the start of the path parameter.
