@@ -44,10 +44,10 @@ mod tests {
     fn lengths_outside_the_range_are_none() {
         for (mm, nm) in [
             (0.123_456_7, Some(123_457)),
-            (2147.483_647, Some(i32::MAX)),
-            (-2147.483_648, Some(i32::MIN)),
-            (2147.483_648, None),
-            (-2147.483_649, None),
+            (2_147.483_647, Some(i32::MAX)),
+            (-2_147.483_648, Some(i32::MIN)),
+            (2_147.483_648, None),
+            (-2_147.483_649, None),
             (3000.0, None),
             (f64::NAN, None),
             (f64::INFINITY, None),

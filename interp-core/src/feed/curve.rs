@@ -29,6 +29,9 @@ struct Piece {
     /// Duration of the jerk at either end of the ramp, s, and of the ramp.
     jerk_s: f32,
     ramp_s: f32,
+    /// Acceleration in the middle of the ramp, mm/s^2, and jerk at its begin, mm/s^3.
+    peak: f32,
+    jerk: f32,
     /// Length of the cruise, units of 2^-10 nm.
     cruise_q10: i64,
 }
@@ -39,16 +42,25 @@ impl Piece {
         to: 0.0,
         jerk_s: 0.0,
         ramp_s: 0.0,
+        peak: 0.0,
+        jerk: 0.0,
         cruise_q10: 0,
     };
 
     fn new(from: f32, to: f32, limits: &CurveLimits, cruise_q10: i64) -> Self {
         let [jerk_s, ramp_s] = ramp(from - to, limits);
+        let (mut peak, mut jerk) = (0.0, 0.0);
+        if ramp_s > 0.0 {
+            peak = (to - from) / (ramp_s - jerk_s);
+            jerk = peak / jerk_s;
+        }
         Self {
             from,
             to,
             jerk_s,
             ramp_s,
+            peak,
+            jerk,
             cruise_q10: cruise_q10.max(0),
         }
     }
@@ -73,11 +85,10 @@ impl Piece {
             return [self.to, 0.0, 0.0];
         }
         // The acceleration rises to its peak, stays, and falls.
-        let peak = (self.to - self.from) / (self.ramp_s - self.jerk_s);
+        let (peak, jerk) = (self.peak, self.jerk);
         if let Phase::Steady = phase {
             return [self.from + peak * (t - 0.5 * self.jerk_s), peak, 0.0];
         }
-        let jerk = peak / self.jerk_s;
         if let Phase::Begin = phase {
             return [self.from + 0.5 * jerk * t * t, jerk * t, jerk];
         }
@@ -95,8 +106,7 @@ impl Piece {
         let mut range = [one.at_most(other), one.at_least(other)];
         let steady = [self.jerk_s, self.ramp_s - self.jerk_s];
         if self.ramp_s > 0.0 && from <= steady[1] && to >= steady[0] {
-            let peak = at(0.5 * self.ramp_s);
-            range = [range[0].at_most(peak), range[1].at_least(peak)];
+            range = [range[0].at_most(self.peak), range[1].at_least(self.peak)];
         }
         range
     }
@@ -432,9 +442,9 @@ impl Course for Curve {
         let around = r * around;
         let next = around + r * slot_s;
         let most = room.acceleration * limits.acceleration;
+        let at = (self.accelerations_beside(cursor, [around, next], v)).map(|a| a * r * r);
         for speed in [v, fastest_around([v, a, j], next)] {
-            let at = self.accelerations_beside(cursor, [around, next], v);
-            span.add_acceleration(at.map(|a| a * r * r), speed, most);
+            span.add_acceleration(at, speed, most);
         }
         // The speed changes over the time around the place, and the jerk steps.
         let fastest = fastest_around([v, a, j], around);

@@ -7,7 +7,7 @@ use crate::feed::profile::{Profiles, SlotAt, Span};
 use crate::job::AxisLimits;
 use crate::math::arith::{sqrt, truncated};
 use crate::math::number::Bounded;
-use crate::sequence::link::StraightMove;
+use crate::sequence::link::StraightPath;
 use crate::sequence::lookahead::check_travel;
 
 /// Greatest height above the safe height that a hop takes, mm.
@@ -52,7 +52,7 @@ impl Course for Curves {
 
     fn use_at(&self, cursor: &HopCursor, rates: [f32; 3], around: f32) -> Use {
         let mut most = Use::NONE;
-        for (place, curve) in cursor.curves.iter().zip(&self.curves) {
+        for (place, curve) in self.moving(cursor, rates[0] * around) {
             most.add(&curve.use_at(place, rates, around));
         }
         most
@@ -64,10 +64,25 @@ impl Course for Curves {
 
     fn span_at(&self, cursor: &HopCursor, slot: &SlotAt, room: &Use) -> Span {
         let mut most = Span::WIDE;
-        for (place, curve) in cursor.curves.iter().zip(&self.curves) {
+        for (place, curve) in self.moving(cursor, slot.r * (slot.around + slot.slot_s)) {
             most.add(&curve.span_at(place, slot, room));
         }
         most
+    }
+}
+
+impl Curves {
+    /// The curves that are under way, or within this time, and the places on them.
+    fn moving<'a>(
+        &'a self,
+        cursor: &'a HopCursor,
+        around: f32,
+    ) -> impl Iterator<Item = (&'a CurveCursor, &'a Curve)> {
+        let places = cursor.curves.iter().zip(&self.curves).zip(&self.begins);
+        let now = cursor.time + around;
+        places
+            .filter(move |((place, curve), begin)| **begin <= now && !curve.is_over(place))
+            .map(|(of, _)| of)
     }
 }
 
@@ -75,7 +90,7 @@ impl Course for Curves {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Hop {
     curves: Curves,
-    legs: [StraightMove; 3],
+    paths: [StraightPath; 3],
     cursor: HopCursor,
     pace: Pace<HopCursor>,
     /// It is planned, from and to these positions.
@@ -89,7 +104,7 @@ impl Hop {
             curves: [Curve::NONE; 3],
             begins: [0.0; 3],
         },
-        legs: [StraightMove::NONE; 3],
+        paths: [StraightPath::NONE; 3],
         cursor: HopCursor {
             time: 0.0,
             curves: [CurveCursor::START; 3],
@@ -131,24 +146,24 @@ impl Hop {
         if check_travel(axes, &above).is_err() || check_travel(axes, &there).is_err() {
             return;
         }
-        let feed = feed_mm_s;
-        let [up, across, down] = &mut self.legs;
-        let has_each = up.lead(from, above, 0.0, feed, axes)
-            && across.lead(above, there, 0.0, feed, axes)
-            && down.lead(there, to, axes.plunge_mm, feed, axes);
-        if !has_each {
-            return;
+        let ways = [
+            (from, above, 0.0),
+            (above, there, 0.0),
+            (there, to, axes.plunge_mm),
+        ];
+        let curves = self.curves.curves.iter_mut().zip(&mut self.paths);
+        for ((curve, path), (from, to, slow_mm)) in curves.zip(ways) {
+            let Some((length, limits)) = path.lead(from, to, axes) else {
+                return;
+            };
+            *curve = Curve::new(length, &limits, slow_mm, feed_mm_s);
         }
-        let [up, across, down] = &self.legs;
-        let [rise, move_, fall] = [up, across, down].map(|leg| leg.progress.curve());
+        let [rise, move_, fall] = &self.curves.curves;
         // Across begins when the ball passes the safe height, and ends before it passes it again.
         let leaves = time_at(rise, nm_q10(safe, from[2])) + APART_S;
         let returns = time_at(fall, nm_q10(top, safe)) - APART_S;
         let falls = rise.duration().at_least(leaves + move_.duration() - returns);
-        self.curves = Curves {
-            curves: [*rise, *move_, *fall],
-            begins: [0.0, leaves, falls],
-        };
+        self.curves.begins = [0.0, leaves, falls];
         self.cursor = HopCursor {
             time: 0.0,
             curves: self.curves.curves.each_ref().map(Curve::start),
@@ -187,8 +202,9 @@ impl Hop {
     pub(crate) fn position(&self) -> [i32; 3] {
         let falls = self.cursor.time > self.curves.begins[2];
         let [across, vertical] = [1, if falls { 2 } else { 0 }].map(|leg: usize| {
-            let places = self.legs.get(leg).zip(self.cursor.curves.get(leg));
-            places.map_or([0; 3], |(leg, place)| leg.position_at(place))
+            let (path, curve) = (self.paths.get(leg), self.curves.curves.get(leg));
+            let places = path.zip(curve).zip(self.cursor.curves.get(leg));
+            places.map_or([0; 3], |((path, curve), place)| path.position_at(curve, place))
         });
         [across[0], across[1], vertical[2]]
     }

@@ -200,7 +200,7 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "halvings of the jumps, and those near a place",
     ),
     (
-        "interp_core::feed::planner::Planner::lasts",
+        "interp_core::feed::planner::effort::lasts",
         162,
         "coefficients of a plan",
     ),
@@ -215,7 +215,7 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "coefficients of a pace: COEFFICIENTS",
     ),
     (
-        "interp_core::feed::planner::Planner::work",
+        "interp_core::feed::planner::Planner::scale_start",
         162,
         "coefficients of a pace: COEFFICIENTS",
     ),
@@ -463,9 +463,9 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "coefficients of a turn; axes",
     ),
     (
-        "interp_core::feed::walk::Walker::work",
-        168,
-        "stations: STATIONS_MAX",
+        "interp_core::feed::walk::Walker::means",
+        60,
+        "nodes of a portion: NODES_A_PORTION",
     ),
     (
         "interp_core::pass::front::crest::CrestSearch::height",
@@ -482,6 +482,12 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         3,
         "curves of a hop",
     ),
+    (
+        "interp_core::sequence::hop::Curves as interp_core::feed::pace::Course::span_at",
+        3,
+        "curves of a hop",
+    ),
+    ("interp_core::sequence::hop::Hop::plan", 3, "curves of a hop"),
     ("interp_core::sequence::hop::Hop::speed", 3, "curves of a hop"),
     (
         "interp_core::sequence::lookahead::stations::patch_lengths",

@@ -12,7 +12,7 @@ use crate::feed::to_q10;
 use crate::math::arith::sqrt;
 use crate::math::number::{MM_PER_NM, to_f32};
 pub(crate) use step_over::{Along, BoundaryEnd, BoundaryStepOver};
-pub(crate) use straight::StraightMove;
+pub(crate) use straight::{StraightMove, StraightPath};
 
 /// Links up to this length, nm, are omitted: the rounding difference of one position computed twice.
 const NOTHING_NM: i64 = 2;
@@ -25,7 +25,6 @@ pub(crate) struct Progress {
     curve: Curve,
     cursor: CurveCursor,
     length_q10: i64,
-    whole: Whole,
     pace: Pace<CurveCursor>,
 }
 
@@ -65,7 +64,6 @@ impl Progress {
         curve: Curve::NONE,
         cursor: CurveCursor::START,
         length_q10: 0,
-        whole: Whole::NONE,
         pace: Pace::REST,
     };
 
@@ -73,7 +71,6 @@ impl Progress {
         self.cursor = curve.start();
         self.curve = curve;
         self.length_q10 = to_q10(length);
-        self.whole = Whole::new(self.length_q10);
         self.pace = Pace::REST;
     }
 
@@ -83,11 +80,6 @@ impl Progress {
         self.cursor = self.curve.start();
         self.length_q10 = 0;
         self.pace = Pace::REST;
-    }
-
-    /// The motion along the link.
-    pub(crate) const fn curve(&self) -> &Curve {
-        &self.curve
     }
 
     /// Begins at this pace.
