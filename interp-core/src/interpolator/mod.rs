@@ -65,7 +65,7 @@ impl<S> Interpolator<S> {
 impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
     /// Where the next run begins, of a job with axis limits; at the start of the job at power-up, after each start and each load. The passes before are skipped in
     /// the planning while the tool stands: those from there on are the same as in a run of the whole job. On a place within a pass the tool begins at rest, with that
-    /// place's sample, and goes on along the same path; from the end of a pass, with the next one. A place that is on no pass is a fault of the run, [`FaultKind::WrongState`](crate::FaultKind::WrongState)
+    /// place's sample, and goes on along the same path; from the end of a pass, with the next one. A place that is on no pass is a fault of the run, [`FaultKind::WrongState`]
     /// with the pass.
     pub const fn begin_at(&mut self, start: RunStart) {
         self.motion.sequencer.begin_at(start);
