@@ -26,7 +26,7 @@ pub(super) fn command(
     let passes = count_passes(job)?;
     bar.finish_and_clear();
     let mut sketch = directory.map(|_| Sketch::new(job, passes).by(kind.name()));
-    let (mut trace, whole) = begun(wanted, job)?;
+    let (mut trace, output) = begun(wanted, job)?;
     let mut written = Ok(());
     let bar = progress(passes as u64, "following");
     let start = std::time::Instant::now();
@@ -45,7 +45,7 @@ pub(super) fn command(
     bar.finish_and_clear();
     #[allow(clippy::cast_precision_loss, reason = "below 2^53")]
     let samples_per_second = measured.findings.samples as f64 / start.elapsed().as_secs_f64().max(1e-9);
-    completed(written, trace, whole, wanted)?;
+    completed(written, trace, output, wanted)?;
     let remarks = Remarks {
         warnings: unheld_limits(job).into_iter().collect(),
         ..Remarks::default()

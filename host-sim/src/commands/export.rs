@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use serde_json::json;
 
 use super::out::say;
-use super::{Failure, Result, along, load, numbers, progress, spinner, whole};
+use super::{Failure, Result, along, load, numbers, output_file, progress, spinner};
 use approach::export::{Dialect, ExportError, Options, export};
 use approach::gcode::FeedMode;
 use approach::{Kind, passes};
@@ -75,7 +75,7 @@ impl From<ExportError> for Failure {
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let (job, _) = load(&arguments.job)?;
     super::whole_surface(&job)?;
-    whole::check(&arguments.output, arguments.force)?;
+    output_file::check(&arguments.output, arguments.force)?;
     let options = Options {
         dialect: arguments.format,
         kind: arguments.approach,
@@ -94,7 +94,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     };
     let exported = export(&job, &options, &|| bar.inc(1))?;
     bar.finish_and_clear();
-    whole::write(&arguments.output, exported.text.as_bytes(), arguments.force)?;
+    output_file::write(&arguments.output, exported.text.as_bytes(), arguments.force)?;
     let (bytes, blocks) = (exported.text.len(), exported.text.lines().count());
     if arguments.json {
         let mut value = json!({

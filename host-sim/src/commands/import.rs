@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde_json::{Value, json};
 
-use super::{Failure, Result, region_words, spinner, whole};
+use super::{Failure, Result, output_file, region_words, spinner};
 use cad::{
     CadError, Face, Form, JobOptions, JobText, MachinableFace, Model, Options, machinable, read_once,
     write_job,
@@ -309,14 +309,14 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
             "show the faces with --list, or write a job with -o JOB.toml",
         ));
     }
-    whole::note_input(&arguments.file);
+    output_file::note_input(&arguments.file);
     for path in arguments
         .output
         .iter()
         .filter(|_| !arguments.part)
         .chain(&arguments.page)
     {
-        whole::check(path, arguments.force)?;
+        output_file::check(path, arguments.force)?;
     }
     let model = read_once(&arguments.file)?;
     for warning in &model.warnings {
@@ -366,7 +366,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         written.text = spaced(&written.text, "constant", Some(start.name()));
         job_file::parse_with(&name, &written.text, &part::Faces)?;
     }
-    whole::write(path, written.text.as_bytes(), arguments.force)?;
+    output_file::write(path, written.text.as_bytes(), arguments.force)?;
     let written = Written {
         path,
         face,

@@ -24,6 +24,7 @@ mod numbers;
 mod operate;
 mod out;
 mod outcome;
+mod output_file;
 #[cfg(feature = "developer")]
 mod paper;
 mod part_words;
@@ -40,7 +41,6 @@ mod stored;
 mod swept_words;
 mod typed;
 mod verify;
-mod whole;
 
 use out::{complain, say};
 use programs::with_command_name;
@@ -51,7 +51,7 @@ use std::process::ExitCode;
 
 use clap::builder::{Resettable, StyledStr};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
-use whole::Whole;
+use output_file::OutputFile;
 
 use ::approach::ApproachError;
 use inspect::InspectError;
@@ -275,13 +275,13 @@ impl job_file::FaceReader for Faces {
         &self,
         face: &job_file::Face,
     ) -> std::result::Result<job_file::FaceSurface, job_file::FaceError> {
-        whole::note_input(&face.path);
+        output_file::note_input(&face.path);
         part::Faces.surface(face)
     }
 
     fn region(&self, job: &Job) -> std::result::Result<job_file::FaceRegion, job_file::FaceError> {
         if let Some(part) = job.origin.part() {
-            whole::note_input(&part.path);
+            output_file::note_input(&part.path);
         }
         part::Faces.region(job)
     }
@@ -289,14 +289,14 @@ impl job_file::FaceReader for Faces {
 
 /// Reads a job file, and notes it as an input.
 fn read_job(path: &Path, profile: Option<&MachineProfile>) -> Result<Job> {
-    whole::note_input(path);
+    output_file::note_input(path);
     Ok(job_file::load_on(path, &Faces, profile)?)
 }
 
 /// Reads a machine's profile, if one is given, and notes it as an input.
 fn read_profile(path: Option<&PathBuf>) -> Result<Option<MachineProfile>> {
     let Some(path) = path else { return Ok(None) };
-    whole::note_input(path);
+    output_file::note_input(path);
     Ok(Some(job_file::load_profile(path)?))
 }
 
@@ -378,11 +378,11 @@ impl<'a> WantedTrace<'a> {
     }
 
     /// Begins the file.
-    fn begin(self, job: &Job) -> Result<(::verify::trace::Trace, Whole)> {
-        let whole = Whole::begin(self.path, self.force)?;
-        let trace = ::verify::trace::Trace::new(whole.file()?, job.machine.period_us)
+    fn begin(self, job: &Job) -> Result<(::verify::trace::Trace, OutputFile)> {
+        let output = OutputFile::begin(self.path, self.force)?;
+        let trace = ::verify::trace::Trace::new(output.file()?, job.machine.period_us)
             .map_err(|error| cannot_write(self.path, &error))?;
-        Ok((trace, whole))
+        Ok((trace, output))
     }
 }
 
@@ -390,7 +390,7 @@ impl<'a> WantedTrace<'a> {
 fn begun(
     wanted: Option<WantedTrace<'_>>,
     job: &Job,
-) -> Result<(Option<::verify::trace::Trace>, Option<Whole>)> {
+) -> Result<(Option<::verify::trace::Trace>, Option<OutputFile>)> {
     Ok(wanted.map(|wanted| wanted.begin(job)).transpose()?.unzip())
 }
 
@@ -398,14 +398,14 @@ fn begun(
 fn completed(
     written: std::io::Result<()>,
     trace: Option<::verify::trace::Trace>,
-    whole: Option<Whole>,
+    output: Option<OutputFile>,
     wanted: Option<WantedTrace<'_>>,
 ) -> Result<()> {
     let path = wanted.map_or(Path::new(""), |wanted| wanted.path);
     written
         .and_then(|()| trace.map_or(Ok(()), ::verify::trace::Trace::finish))
         .map_err(|error| cannot_write(path, &error))?;
-    whole.map_or(Ok(()), Whole::finish)
+    output.map_or(Ok(()), OutputFile::finish)
 }
 
 fn cannot_write(path: &Path, error: &std::io::Error) -> Failure {

@@ -7,7 +7,7 @@ use serde_json::json;
 
 use super::import::advice_json;
 use super::out::say;
-use super::{Result, spinner, whole};
+use super::{Result, output_file, spinner};
 use crate::template::{self, Kind};
 use machine::advice::advise_spacing;
 
@@ -34,7 +34,7 @@ pub(super) struct Arguments {
 
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let path = &arguments.output;
-    whole::check(path, arguments.force)?;
+    output_file::check(path, arguments.force)?;
     let name = path.display().to_string();
     let mut text = template::job(arguments.kind, &name);
     let mut advice = None;
@@ -47,7 +47,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         }
         advice = Some(found);
     }
-    whole::write(
+    output_file::write(
         path,
         programs::with_command_name(&text).as_bytes(),
         arguments.force,

@@ -19,7 +19,7 @@ use super::out::say;
 use super::outcome::Outcome;
 use super::resume;
 use super::simulate::{WantedReport, remarks, report, surveyed, timed};
-use super::{Failure, Result, error_json, progress, read_profile, scripted, whole};
+use super::{Failure, Result, error_json, output_file, progress, read_profile, scripted};
 use approach::Kind;
 use compare::{by_digest, by_sample};
 pub(super) use connect::open_port;
@@ -392,10 +392,10 @@ fn wanted_outputs<'a>(
     folder: Option<&'a Path>,
 ) -> Result<Option<WantedReport<'a>>> {
     if let Some(script) = &arguments.script {
-        whole::note_input(script);
+        output_file::note_input(script);
     }
     if let Some(path) = &arguments.trace {
-        whole::check(path, arguments.force)?;
+        output_file::check(path, arguments.force)?;
     }
     let directory = WantedReport::new(folder, arguments.force)?;
     if arguments.fast && job.machine.heartbeat_action == HeartbeatAction::Hold {

@@ -46,7 +46,7 @@ pub(super) fn play(
     wanted: Option<WantedTrace<'_>>,
 ) -> Result<Scripted> {
     let script = read(path, prepared)?;
-    let (mut file, whole) = begun(wanted, job)?;
+    let (mut file, output) = begun(wanted, job)?;
     let mut written = Ok(());
     let mut machine = Machine::load(prepared).map_err(|fault| inspect::load_error(job, fault))?;
     let has_limits = job.machine.has_limits();
@@ -70,7 +70,7 @@ pub(super) fn play(
         |period| ends.push(period),
     );
     gauge.end_at_rest();
-    completed(written, file, whole, wanted)?;
+    completed(written, file, output, wanted)?;
     Ok(Scripted {
         script,
         schedule: Schedule::of(&played, ends),

@@ -7,7 +7,7 @@ use protocol::message::{Profile, Request};
 use serde_json::json;
 
 use super::out::say;
-use super::whole::Whole;
+use super::output_file::OutputFile;
 use super::{Failure, Result, cannot_write, read_profile, run};
 use machine::profile;
 
@@ -42,10 +42,10 @@ pub(super) struct Arguments {
 
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let wanted = read_profile(arguments.machine.as_ref())?;
-    let whole = arguments
+    let output = arguments
         .output
         .as_ref()
-        .map(|path| Whole::begin(path, arguments.force))
+        .map(|path| OutputFile::begin(path, arguments.force))
         .transpose()?;
     let mut session = run::open_port(&arguments.port)?;
     if arguments.forget || wanted.is_some() {
@@ -54,10 +54,10 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     // Whatever was written is read back.
     let kept = session.profile()?;
     let text = kept.as_ref().map(|kept| profile::text(&profile::of_board(kept)));
-    if let (Some(whole), Some(path), Some(text)) = (whole, &arguments.output, &text) {
-        std::io::Write::write_all(&mut whole.file()?, text.as_bytes())
+    if let (Some(output), Some(path), Some(text)) = (output, &arguments.output, &text) {
+        std::io::Write::write_all(&mut output.file()?, text.as_bytes())
             .map_err(|error| cannot_write(path, &error))?;
-        whole.finish()?;
+        output.finish()?;
     }
     let board = session.capabilities().description.board.as_str();
     if arguments.json {

@@ -14,8 +14,8 @@ use verify::survey::{SampleObserver, SurveyResult};
 
 use super::outcome::Outcome;
 use super::{
-    Bar, Failure, Result, WantedTrace, approach, begun, cannot_write, completed, home, read_profile,
-    scripted, warn_of_limits, whole,
+    Bar, Failure, Result, WantedTrace, approach, begun, cannot_write, completed, home, output_file,
+    read_profile, scripted, warn_of_limits,
 };
 
 /// Runs a job on this computer with the core of the firmware, bit-identical to the board, or with another approach of the paper.
@@ -79,14 +79,14 @@ pub(super) fn surveyed(
         .map(|sketch| |emitted: &PassSample, checked: &SampleCheck| sketch.add(emitted, checked));
     let each = draw.as_mut().map(|draw| draw as &mut SampleObserver<'_>);
     let bar = Bar::new();
-    let (trace, whole) = begun(wanted, job)?;
+    let (trace, output) = begun(wanted, job)?;
     let findings = inspect::survey_run(job, prepared, timed.samples, trace, each, &bar);
     bar.clear();
     let findings = findings.map_err(|error| match (error, wanted) {
         (InspectError::Trace(error), Some(wanted)) => cannot_write(wanted.path, &error),
         (error, _) => error.into(),
     })?;
-    completed(Ok(()), None, whole, wanted)?;
+    completed(Ok(()), None, output, wanted)?;
     Ok((findings, sketch))
 }
 
@@ -114,7 +114,7 @@ impl<'a> WantedReport<'a> {
     pub(super) fn new(directory: Option<&'a Path>, force: bool) -> Result<Option<Self>> {
         directory
             .map(|directory| {
-                whole::check_folder(directory, &REPORT_FILES, force)?;
+                output_file::check_folder(directory, &REPORT_FILES, force)?;
                 Ok(Self { directory, force })
             })
             .transpose()
@@ -131,7 +131,7 @@ pub(super) fn report(
 ) -> Result<Option<PathBuf>> {
     let write = |(wanted, sketch): (WantedReport<'_>, &Sketch)| {
         let WantedReport { directory, force } = wanted;
-        whole::write_folder(directory, &REPORT_FILES, force, |folder| {
+        output_file::write_folder(directory, &REPORT_FILES, force, |folder| {
             let name = Path::new(job.origin.name());
             sketch.write(folder, name, findings, remarks).map(|_| ())
         })?;
@@ -146,9 +146,9 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     arguments
         .script
         .iter()
-        .for_each(|script| whole::note_input(script));
+        .for_each(|script| output_file::note_input(script));
     let wanted = WantedTrace::new(arguments.trace.as_ref(), arguments.force);
-    wanted.map_or(Ok(()), |wanted| whole::check(wanted.path, wanted.force))?;
+    wanted.map_or(Ok(()), |wanted| output_file::check(wanted.path, wanted.force))?;
     let directory = WantedReport::new(arguments.report.as_deref(), arguments.force)?;
     if arguments.approach != Kind::Surface {
         warn_of_limits(&job);

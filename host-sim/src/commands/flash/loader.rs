@@ -8,7 +8,7 @@ use programs::{Part, image_remedy};
 use protocol::frame::crc32;
 use serde_json::json;
 
-use super::super::{Failure, Result, out::say, whole};
+use super::super::{Failure, Result, out::say, output_file};
 use super::Arguments;
 use crate::probe::Image;
 
@@ -52,9 +52,9 @@ fn card(arguments: &Arguments, folder: &Path) -> Result<()> {
         ));
     }
     let path = folder.join(loader.file);
-    whole::check(&path, arguments.force)?;
+    output_file::check(&path, arguments.force)?;
     let bytes = flat(arguments, Part::LoaderImage(board), loader.image_begin)?;
-    whole::write(&path, &bytes, arguments.force)?;
+    output_file::write(&path, &bytes, arguments.force)?;
     if arguments.json {
         say!(
             "{}",
@@ -96,7 +96,7 @@ fn dfu(arguments: &Arguments) -> Result<()> {
         ));
     };
     if let Some(path) = &arguments.dfu_file {
-        whole::check(path, arguments.force)?;
+        output_file::check(path, arguments.force)?;
     } else if !has_dfu_util() {
         return Err(Failure::input(
             format!("there is no program {DFU_UTIL}"),
@@ -107,7 +107,7 @@ fn dfu(arguments: &Arguments) -> Result<()> {
     }
     let flat = flat(arguments, Part::BoardImage(board), FLASH_BEGIN)?;
     if let Some(path) = &arguments.dfu_file {
-        whole::write(path, &dfuse_file(FLASH_BEGIN, &flat), arguments.force)?;
+        output_file::write(path, &dfuse_file(FLASH_BEGIN, &flat), arguments.force)?;
         if arguments.json {
             say!(
                 "{}",

@@ -9,7 +9,7 @@ use clap::ValueEnum;
 use serde_json::{Value, json};
 
 use super::super::out::say;
-use super::super::{Result, progress, region_words, whole};
+use super::super::{Result, output_file, progress, region_words};
 use super::{Arguments, condition, deviation_json, page, whole_part};
 use cad::{
     CadError, Face, Form, MachinableFace, Measures, Model, Options, degrees, machinable, machined_sign,
@@ -290,7 +290,7 @@ pub(super) fn list(arguments: &Arguments, file: &str, model: &Arc<Model>, option
         rows.reverse();
     }
     if let Some(path) = &arguments.page {
-        whole::write(path, page::page(file, &rows).as_bytes(), arguments.force)?;
+        output_file::write(path, page::page(file, &rows).as_bytes(), arguments.force)?;
     }
     let faces: Vec<&Face> = rows.iter().map(|row| row.face).collect();
     let reaches = arguments

@@ -15,7 +15,7 @@ use job::{FaceParameters, FaceReach};
 use rayon::prelude::*;
 
 use super::super::out::say;
-use super::super::{Failure, Result, progress, whole};
+use super::super::{Failure, Result, output_file, progress};
 use super::Arguments;
 use cad::{CadError, Face, MachinableFace, Model, Options, machinable_once};
 use face::{Asked, Outcome, outcome};
@@ -132,10 +132,10 @@ pub(super) fn command(arguments: &Arguments, file: &str, model: &Arc<Model>, out
     let folder = output.folder();
     if output.is_file {
         for path in [output.path.to_owned(), output.page(), output.summary()] {
-            whole::check(&path, arguments.force)?;
+            output_file::check(&path, arguments.force)?;
         }
     } else {
-        whole::check_folder(&folder, &["summary.json", "part.html"], arguments.force)?;
+        output_file::check_folder(&folder, &["summary.json", "part.html"], arguments.force)?;
     }
     std::fs::create_dir_all(&folder).map_err(|error| super::super::cannot_write(&folder, &error))?;
     let bar = progress(faces.len() as u64, "regions");
@@ -255,18 +255,18 @@ fn write(
         let outcome = &mut outcomes[*index];
         let path = output.job(place, outcome.number);
         if !output.is_file {
-            whole::write(&path, outcome.text.as_bytes(), arguments.force)?;
+            output_file::write(&path, outcome.text.as_bytes(), arguments.force)?;
         }
         outcome.job = Some(path);
     }
     if output.is_file {
         let text = program(arguments, file, output, setup, &order, &outcomes);
-        whole::write(output.path, text.as_bytes(), arguments.force)?;
+        output_file::write(output.path, text.as_bytes(), arguments.force)?;
     }
     let sums = Sums::of(&outcomes);
     let page = page(file, model, setup, &order, &outcomes);
     let page_path = output.page();
-    whole::write(&page_path, page.as_bytes(), arguments.force)?;
+    output_file::write(&page_path, page.as_bytes(), arguments.force)?;
     let summary = summary(
         arguments,
         file,
@@ -277,7 +277,7 @@ fn write(
         &page_path,
     );
     let text = serde_json::to_string_pretty(&summary).unwrap_or_default();
-    whole::write(&output.summary(), text.as_bytes(), arguments.force)?;
+    output_file::write(&output.summary(), text.as_bytes(), arguments.force)?;
     if arguments.json {
         say!("{summary}");
         return Ok(());

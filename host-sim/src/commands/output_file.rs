@@ -136,7 +136,7 @@ pub(super) fn write(path: &Path, bytes: &[u8], force: bool) -> Result<()> {
 }
 
 /// A file that takes long to write. Until it is complete it has no name: nothing of it remains if the command is killed.
-pub(super) struct Whole {
+pub(super) struct OutputFile {
     path: PathBuf,
     force: bool,
     /// The file without a name; for a stream, the stream.
@@ -144,7 +144,7 @@ pub(super) struct Whole {
     stream: bool,
 }
 
-impl Whole {
+impl OutputFile {
     /// Begins a file.
     ///
     /// # Errors
@@ -296,7 +296,7 @@ mod tests {
         note_input(&job);
         for path in [&job, &link] {
             assert!(said(write(path, b"x", true)).contains("is what the command reads"));
-            assert!(said(Whole::begin(path, true).map(|_| ())).contains("is what the command reads"));
+            assert!(said(OutputFile::begin(path, true).map(|_| ())).contains("is what the command reads"));
         }
         assert_eq!(std::fs::read(&job).unwrap(), b"job");
     }
@@ -305,21 +305,21 @@ mod tests {
     fn what_is_not_complete_has_no_name() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("trace.csv");
-        let whole = Whole::begin(&path, false).unwrap();
-        whole.file().unwrap().write_all(b"tick\n1\n").unwrap();
+        let output = OutputFile::begin(&path, false).unwrap();
+        output.file().unwrap().write_all(b"tick\n1\n").unwrap();
         assert!(names(folder.path()).is_empty());
-        drop(whole);
+        drop(output);
         assert!(names(folder.path()).is_empty());
-        let whole = Whole::begin(&path, false).unwrap();
-        whole.file().unwrap().write_all(b"tick\n1\n").unwrap();
-        whole.finish().unwrap();
+        let output = OutputFile::begin(&path, false).unwrap();
+        output.file().unwrap().write_all(b"tick\n1\n").unwrap();
+        output.finish().unwrap();
         assert_eq!(std::fs::read(&path).unwrap(), b"tick\n1\n");
-        assert!(said(Whole::begin(&path, false).map(|_| ())).contains("exists already"));
+        assert!(said(OutputFile::begin(&path, false).map(|_| ())).contains("exists already"));
         // Made by another program meanwhile.
         let other = folder.path().join("other.csv");
-        let whole = Whole::begin(&other, false).unwrap();
+        let output = OutputFile::begin(&other, false).unwrap();
         std::fs::write(&other, "other").unwrap();
-        assert!(said(whole.finish()).contains("exists already"));
+        assert!(said(output.finish()).contains("exists already"));
         assert_eq!(std::fs::read(&other).unwrap(), b"other");
     }
 
