@@ -71,7 +71,8 @@ fn crates_do_not_see_what_they_may_not_see() {
         seen
     };
     without("machine", &[], &["oracle", "verify", "inspect"]);
-    for of in ["inspect", "report", "approach", "cad"] {
+    without("part-program", &[], &["verify", "inspect", "report"]);
+    for of in ["inspect", "report", "approach", "cad", "part-program"] {
         without(of, &[], &["study", "cycles", "cycle-plugin"]);
     }
     let developers = ["study", "cycles", "cycle-plugin"];

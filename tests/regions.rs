@@ -6,7 +6,6 @@ mod curved;
 use std::path::PathBuf;
 
 use inspect::BOUNDS;
-use interp_core::job::links::Detour;
 use interp_core::job::region::{CROSSINGS_MAX, EDGE_WORDS};
 use job::{Along, AxisLimits, Job, MachineSpec, NurbsSpec, Pattern, Region, Side, Spacing, SurfaceSpec};
 use machine::links::{self, Link};
@@ -404,23 +403,9 @@ fn a_link_rises_to_its_height() {
         }
         assert!(lowered > 5, "{lowered}");
         // As high as they need to be.
-        let millimetres = |nm: [i32; 3]| glam::DVec3::from(nm.map(f64::from)) * 1e-6;
-        let safe_mm = f64::from(safe.header.axes.unwrap().safe_z_nm) * 1e-6;
-        let ends_mm = ends.iter().map(|ends| ends.map(millimetres)).collect();
-        let ways = part::ways(&job, b"", safe_mm, || ends_mm).unwrap();
-        let needed: Vec<Link> = ways
-            .iter()
-            .map(|way| match way {
-                part::Way::Straight => Link::Straight,
-                part::Way::Around { aside, rise } => Link::Around(Detour {
-                    aside: *aside,
-                    rise: *rise,
-                }),
-                part::Way::Across(height_mm) => Link::Across((height_mm * 1e6).ceil() as i32),
-            })
-            .collect();
         let mut low = safe.clone();
-        links::add(&mut low, &needed);
+        part_program::add_links(&job, &mut low).unwrap();
+        assert_eq!(usize::from(low.header.links), ends.len());
         let times = [&safe, &low].map(|prepared| {
             let timed = inspect::time_run(&job, prepared, &()).unwrap();
             let found = inspect::verify_run(

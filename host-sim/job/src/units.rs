@@ -1,9 +1,11 @@
-//! Millimetres, the unit of a job, and nanometres, the unit of the machine's positions.
+//! Millimetres, the unit of a job, and nanometres, the unit of the machine's positions; minutes of a feed.
 
 /// Nanometres in a millimetre.
 pub const NM_PER_MM: f64 = 1e6;
 /// Millimetres in a nanometre.
 pub const MM_PER_NM: f64 = 1e-6;
+/// Seconds in a minute.
+pub const S_PER_MIN: f64 = 60.0;
 /// Range of the machine's positions in words, for errors: 32 bits of nanometres.
 pub const POSITION_RANGE: &str = "the machine's range is ±2147.483 mm";
 
@@ -15,6 +17,13 @@ pub fn nanometres(mm: f64) -> Option<i32> {
     (f64::from(i32::MIN)..=f64::from(i32::MAX))
         .contains(&nm)
         .then_some(nm as i32)
+}
+
+/// The least whole nanometres that are not below a height, mm; at most `i32::MAX`.
+#[must_use]
+#[allow(clippy::cast_possible_truncation, reason = "the cast saturates")]
+pub fn nanometres_up(mm: f64) -> i32 {
+    (mm * NM_PER_MM).ceil() as i32
 }
 
 /// The nearest nanometres of a position; `None` where an axis is outside the machine's range.

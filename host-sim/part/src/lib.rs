@@ -8,13 +8,14 @@
 //!                                 ▲ crease.rs    cut at knots at which the tangent plane jumps
 //!
 //! ends of passes ──links.rs──► how each link goes: straight, or at the height that the tool needs over the part
-//! emitted centres ──proof.rs──► the deepest place of the tool in the part, what is left on the reachable part of the face
+//! emitted centres ──proof.rs──► the deepest place of the tool in the part, what is left on the reachable part of the face; verdicts: check.rs
 //! ```
 //!
 //! Not in the sample path: f64; lengths in mm.
 
 mod body;
 mod cell;
+mod check;
 mod clear;
 mod contour;
 mod crease;
@@ -32,6 +33,7 @@ mod tree;
 mod triangle;
 
 pub use body::{Missing, Near, OwnContact, Part, PartFace};
+pub use check::{PartCheck, PassCentres, check_run};
 pub use clear::{Clearance, Place};
 pub use contour::{Precision, Set};
 pub use faces::{Asked, Faces, own_face, part_of, placed_part, placement};

@@ -6,7 +6,6 @@ mod attach;
 mod axes;
 #[cfg(feature = "developer")]
 mod budget;
-mod chain;
 mod completions;
 mod error_json;
 mod explain;
@@ -16,7 +15,6 @@ mod home;
 mod import;
 mod interrupt;
 mod judge;
-mod link_words;
 mod log;
 mod motion_words;
 mod new;
@@ -56,8 +54,10 @@ use output_file::OutputFile;
 use ::approach::ApproachError;
 use inspect::InspectError;
 use job::{AlongChoice, Job, MachineProfile};
+use job_file::FaceError;
 use machine::direction::{self, DirectionError};
 use machine::prepare::Prepared;
+use part_program::add_links;
 
 /// Failure of a command, with its exit code.
 #[derive(Debug)]
@@ -80,6 +80,12 @@ impl From<DirectionError> for Failure {
             DirectionError::Refused(error) => error.into(),
             DirectionError::Faults(sentence) => Self::Failed(Some(sentence)),
         }
+    }
+}
+
+impl From<FaceError> for Failure {
+    fn from(error: FaceError) -> Self {
+        Self::input(error.what, error.remedy)
     }
 }
 
@@ -318,7 +324,7 @@ fn settled(job: Job) -> Result<(Job, Prepared)> {
     } else {
         direction::choose(job)?
     };
-    link_words::add(&job, &mut prepared)?;
+    add_links(&job, &mut prepared)?;
     Ok((job, prepared))
 }
 

@@ -11,7 +11,6 @@ use interp_core::FaultKind;
 use protocol::message::{JobName, Request};
 use serde_json::{Value, json};
 
-use super::chain::{self, Stop};
 use super::flash::board_parser;
 use super::home::{self, PositionNm};
 use super::operate::sentence;
@@ -33,6 +32,7 @@ use machine::remote::operate::{self, Setup};
 use machine::remote::session::LineLosses;
 use machine::remote::{Session, drive};
 use machine::travel;
+use part_program::{Stop, stops};
 
 /// Runs a job on the firmware and compares every sample with the simulation: in QEMU, on a board, or with a board's image executed on models of
 /// its chip. While a board runs, type operator commands and Enter: hold, pause, resume, stop, abort, override 50, status. A run with operator commands
@@ -235,7 +235,9 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     }
     let mut bench = bench(arguments)?;
     let (profile, origin, stands) = (bench.profile, bench.origin, bench.stands);
-    let stops = chain::stops(&jobs, |path| home::load(path, profile.as_ref(), origin, stands))?;
+    let stops = stops(&jobs, |path| {
+        home::load(path, profile.as_ref(), origin, stands).ok()
+    })?;
     let (mut values, mut end) = run_all(&jobs, &stops, |path, stop| {
         run_job(arguments, (path, stop), several, &mut bench)
     });

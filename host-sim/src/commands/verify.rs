@@ -7,15 +7,15 @@ use inspect::{BOUNDS, Requirements, RunMeasurements, TimedRun, Verification, ver
 use job::Job;
 use machine::prepare::Prepared;
 use oracle::{AccuracyFigure, PassSample, SampleCheck};
+use part::{PartCheck, PassCentres};
+use part_program::{Stop, stops};
 use report::{Figure, Mark, Remarks, RidgePoint, Scallops, Sketch};
 use serde_json::Value;
 use verify::Verdict;
 use verify::survey::{SampleObserver, SurveyResult};
 use verify::swept;
 
-use super::chain::{self, Stop};
 use super::out::{complain, say};
-use super::part_words::{Centres, PartProof};
 use super::simulate::{WantedReport, remarks, report, timed};
 use super::{
     Bar, Failure, Result, along, error_json, home, motion_words, numbers, part_words, reach_words,
@@ -193,7 +193,7 @@ fn json(job: &Job, prepared: &Prepared, found: &Verification) -> Value {
 }
 
 /// Prints the figures as text.
-fn print_verification(job: &Job, prepared: &Prepared, found: &Verification, proof: Option<&PartProof>) {
+fn print_verification(job: &Job, prepared: &Prepared, found: &Verification, check: Option<&PartCheck>) {
     let RunMeasurements {
         findings,
         swept,
@@ -213,8 +213,8 @@ fn print_verification(job: &Job, prepared: &Prepared, found: &Verification, proo
     }
     swept_words::print(job, prepared, findings, swept, axes);
     reach_words::print(job, reach);
-    if let Some(proof) = proof {
-        proof.print(job);
+    if let Some(check) = check {
+        part_words::print(job, check);
     }
     motion_words::print(times, optimum);
     for failure in &found.failures {
@@ -232,7 +232,7 @@ fn original(job: &Job) -> Result<Option<(Box<swept::OriginalOffset<'static>>, f6
     let Some(source) = job.origin.cad() else {
         return Ok(None);
     };
-    let face = cad::Original::read(source).map_err(|error| Failure::input(error.what, error.remedy))?;
+    let face = cad::Original::read(source)?;
     let surface = oracle::Surface::new(&source.surface);
     Ok(face.map(|face| {
         let offset = move |u: f64, v: f64| {
@@ -263,7 +263,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let mut jobs = Vec::new();
     for path in &arguments.jobs {
         let faces = job_file::jobs_of(path)?;
-        let stops = chain::stops(&faces, |face| load(arguments, face))?;
+        let stops = stops(&faces, |face| load(arguments, face).ok())?;
         jobs.extend(faces.into_iter().zip(stops));
     }
     if let [(job, stop)] = jobs.as_slice() {
@@ -372,7 +372,7 @@ fn verify_job(
         },
     };
     let mut sketch = directory.map(|_| Sketch::new(&job, timed.passes.len()));
-    let mut centres = job.origin.reach().map(|_| Centres::default());
+    let mut centres = job.origin.reach().map(|_| PassCentres::default());
     let mut draw = |emitted: &PassSample, checked: &SampleCheck| {
         if let Some(centres) = &mut centres {
             centres.add(emitted);
@@ -386,13 +386,13 @@ fn verify_job(
     let found = verify_run(&job, &prepared, &timed, Some(each), &requirements, &bar);
     bar.clear();
     let mut found = found?;
-    let proof = match &centres {
-        Some(centres) => part_words::measure(&job, centres, &found.measured.links_mm)?,
+    let check = match &centres {
+        Some(centres) => part::check_run(&job, centres, &found.measured.links_mm)?,
         None => None,
     };
-    if let Some(proof) = &proof {
-        found.failures.extend(proof.failures().iter().cloned());
-        found.warnings.extend(proof.warnings().iter().cloned());
+    if let Some(check) = &check {
+        found.failures.extend(check.failures.iter().cloned());
+        found.warnings.extend(check.warnings.iter().cloned());
     }
     let RunMeasurements { findings, swept, .. } = &found.measured;
     let mut remarks = Remarks {
@@ -406,18 +406,20 @@ fn verify_job(
         ..remarks(&timed, findings)
     };
     remarks.warnings.extend(found.warnings.iter().cloned());
-    remarks.marks.extend(proof.iter().flat_map(PartProof::marks));
+    remarks.marks.extend(check.iter().flat_map(part_words::marks));
     let page = report(&job, directory, sketch.as_ref(), findings, &remarks)?;
     let passed = found.failures.is_empty();
     if !arguments.json {
         say!("{}", path.display());
-        print_verification(&job, &prepared, &found, proof.as_ref());
+        print_verification(&job, &prepared, &found, check.as_ref());
         if let Some(page) = page {
             say!("  report {}", page.display());
         }
     }
     let mut value = json(&job, &prepared, &found);
-    value["part"] = proof.as_ref().map_or(Value::Null, |proof| proof.json(&job));
+    value["part"] = check
+        .as_ref()
+        .map_or(Value::Null, |check| part_words::json(&job, check));
     value["job"] = path.display().to_string().into();
     Ok((passed, value))
 }

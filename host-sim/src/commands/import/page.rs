@@ -1,5 +1,6 @@
 //! `import --list --page`: a page with the picture of the part, on which faces are chosen.
 
+use glam::DVec3;
 use serde_json::{Value, json};
 
 use super::list::{Row, words};
@@ -120,7 +121,7 @@ pub(super) struct PartRow<'f> {
     /// What is finished of it, as rings in space.
     pub(super) region: Vec<Vec<[f64; 3]>>,
     /// The face in cells, each with its colour; empty where the polygons above are exact.
-    pub(super) cells: &'f [([u8; 3], [[f64; 3]; 4])],
+    pub(super) cells: Vec<([u8; 3], [DVec3; 4])>,
     /// Red, green, blue.
     pub(super) tint: [u8; 3],
     /// Its place in the order in which the faces are machined, from 1.

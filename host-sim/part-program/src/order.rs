@@ -11,16 +11,25 @@ const MOVED: usize = 3;
 /// What is saved at least, s: less is rounding.
 const SAVED_S: f64 = 1e-6;
 
-/// The links between the faces of a part. A face is its index, home the index behind the last one.
-pub(super) struct Links {
+/// The faces that have a job, in the order of machining.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FaceOrder {
+    /// Their indices among the plans.
+    pub faces: Vec<usize>,
+    /// Time of the links from home through all of them and back, s; an estimate.
+    pub links_s: f64,
+}
+
+/// Times of the links between the faces of a part. A face is its index, home the index behind the last one.
+pub(crate) struct FaceLinks {
     faces: usize,
     /// From the face of the row to that of the column, s.
     times_s: Vec<f64>,
 }
 
-impl Links {
+impl FaceLinks {
     /// Between faces whose passes start and end here, the ball's centre, mm.
-    pub(super) fn new(heights: &HeightMap, times: &Times, faces_mm: &[[DVec3; 2]], home_mm: DVec3) -> Self {
+    pub(crate) fn new(heights: &HeightMap, times: &Times, faces_mm: &[[DVec3; 2]], home_mm: DVec3) -> Self {
         let ends: Vec<[DVec3; 2]> = faces_mm.iter().copied().chain([[home_mm; 2]]).collect();
         let pairs = ends
             .iter()
@@ -41,7 +50,7 @@ impl Links {
     }
 
     /// The time of all links of an order, from home and back, s.
-    pub(super) fn sum_s(&self, order: &[usize]) -> f64 {
+    pub(crate) fn sum_s(&self, order: &[usize]) -> f64 {
         self.way_s(self.home(), order, self.home())
     }
 
@@ -53,7 +62,7 @@ impl Links {
     }
 
     /// The order of all faces.
-    pub(super) fn order(&self) -> Vec<usize> {
+    pub(crate) fn order(&self) -> Vec<usize> {
         let mut order = self.nearest();
         for _ in 0..ROUNDS {
             if !self.improve(&mut order) {
@@ -135,7 +144,7 @@ impl Links {
 
 #[cfg(test)]
 mod tests {
-    use super::Links;
+    use super::FaceLinks;
     use glam::DVec3;
     use job::AxisLimits;
     use part::{HeightMap, Part, Times};
@@ -143,14 +152,14 @@ mod tests {
     const SAFE_MM: f64 = 30.0;
 
     /// Faces of a plane that is as large as they need.
-    fn links(faces_mm: &[[DVec3; 2]]) -> Links {
+    fn links(faces_mm: &[[DVec3; 2]]) -> FaceLinks {
         let text = "[surface]\nkind = \"nurbs\"\ndegree = [1, 1]\nknots_u = [0, 0, 1, 1]\nknots_v = [0, 0, 1, 1]\n\
             poles_mm = [[[0, 0, -3], [0, 100, -3]], [[100, 0, -3], [100, 100, -3]]]\n\
             [tool]\nkind = \"ball\"\nradius_mm = 3\n[cut]\nfeed_mm_min = 1200\nscallop_mm = 0.01\nalong = \"u\"\nside = \"up\"\n";
         let job = job_file::parse("plane.toml", text).unwrap();
         let plane = Part::of_surface(&oracle::Surface::new(&job.surface));
         let times = Times::new(20.0, AxisLimits::DEFAULT);
-        Links::new(
+        FaceLinks::new(
             &HeightMap::new(&plane, 3.0),
             &times,
             faces_mm,

@@ -2,16 +2,18 @@
 //!
 //! Where something else than the part may be in the way, or the part is not known, each run begins and ends at the job's home.
 
+use glam::DVec3;
 use job::Job;
+use job::units::{millimetres, nanometres_up, position_mm};
+use job_file::FaceError;
 use machine::prepare::Prepared;
 use rayon::prelude::*;
 
-use super::link_words::{is_alone, millimetres, nanometres_up, passes};
-use super::{Failure, Result};
+use crate::links::{only_part_between, passes};
 
 /// Where the run of a face begins and ends. The default: at its job's home.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Stop {
+pub struct Stop {
     /// Its home, nm, if not the job's.
     home_nm: Option<[i32; 3]>,
     /// Where it ends, if not at its home, and at which height it goes there, nm.
@@ -20,13 +22,13 @@ pub(super) struct Stop {
 
 impl Stop {
     /// Makes a job's run begin and end here.
-    pub(super) fn apply(self, job: &mut Job, prepared: &mut Prepared) {
+    pub fn apply(self, job: &mut Job, prepared: &mut Prepared) {
         let Some(axes) = &mut prepared.header.axes else {
             return;
         };
         if let Some(home_nm) = self.home_nm {
             axes.home_nm = home_nm;
-            job.machine.home_mm = Some(millimetres(home_nm).to_array());
+            job.machine.home_mm = Some(position_mm(home_nm));
         }
         if let Some((end_nm, height_nm)) = self.end_nm {
             (axes.end_nm, axes.end_height_nm) = (Some(end_nm), height_nm);
@@ -45,8 +47,8 @@ struct Visit {
 
 impl Visit {
     /// `None` where the run has to begin and end at home.
-    fn new((job, prepared): (Job, Prepared)) -> Result<Option<Self>> {
-        let Some(axes) = prepared.header.axes.filter(|_| is_alone(&job)) else {
+    fn new((job, prepared): (Job, Prepared)) -> Result<Option<Self>, FaceError> {
+        let Some(axes) = prepared.header.axes.filter(|_| only_part_between(&job)) else {
             return Ok(None);
         };
         let passes = passes(&job, &prepared)?;
@@ -60,35 +62,34 @@ impl Visit {
     }
 
     /// Where the run ends and the next begins: straight above the start of the next.
-    fn stop_before(&self, next: &Self) -> Result<[i32; 3]> {
+    fn stop_before(&self, next: &Self) -> Result<[i32; 3], FaceError> {
         let safe_nm = self.safe_nm.max(next.safe_nm);
         let ([_, from], [to, _]) = (self.ends_nm, next.ends_nm);
-        let [_, _, safe_mm] = millimetres([0, 0, safe_nm]).to_array();
-        let height_mm = part::crossing(&self.job, safe_mm, [from, to].map(millimetres))
-            .map_err(|error| Failure::input(error.what, error.remedy))?;
+        let ends_mm = [from, to].map(|nm| DVec3::from(position_mm(nm)));
+        let height_mm = part::crossing(&self.job, millimetres(safe_nm), ends_mm)?;
         let [x, y, _] = to;
         Ok([x, y, nanometres_up(height_mm).min(safe_nm)])
     }
 }
 
-/// Where the runs of the faces begin and end, in this order. A face that cannot be loaded has no part in it.
+/// Where the runs of the faces begin and end, in this order. `load` reads and prepares a face; the runs before and after one that it returns `None` for are at home.
 ///
 /// # Errors
 /// The part's file cannot be read.
-pub(super) fn stops<P: Sync>(
-    faces: &[P],
-    load: impl Fn(&P) -> Result<(Job, Prepared)> + Sync,
-) -> Result<Vec<Stop>> {
+pub fn stops<F: Sync>(
+    faces: &[F],
+    load: impl Fn(&F) -> Option<(Job, Prepared)> + Sync,
+) -> Result<Vec<Stop>, FaceError> {
     if faces.len() < 2 {
         return Ok(vec![Stop::default(); faces.len()]);
     }
-    let visit = |face: &P| load(face).map_or(Ok(None), Visit::new);
-    let visits: Vec<Option<Visit>> = faces.par_iter().map(visit).collect::<Result<_>>()?;
+    let visit = |face: &F| load(face).map_or(Ok(None), Visit::new);
+    let visits: Vec<Option<Visit>> = faces.par_iter().map(visit).collect::<Result<_, _>>()?;
     let between = visits.par_windows(2).map(|pair| match pair {
         [Some(one), Some(next)] => one.stop_before(next).map(Some),
         _ => Ok(None),
     });
-    let between: Vec<Option<[i32; 3]>> = between.collect::<Result<_>>()?;
+    let between: Vec<Option<[i32; 3]>> = between.collect::<Result<_, _>>()?;
     let before = std::iter::once(&None).chain(&between);
     let behind = between.iter().chain([&None]);
     let each = visits.iter().zip(before.zip(behind));
@@ -107,10 +108,17 @@ pub(super) fn stops<P: Sync>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::commands::home;
+    use crate::add_links;
     use interp_core::State;
-    use machine::Machine;
+    use machine::{Machine, direction};
     use std::path::{Path, PathBuf};
+
+    fn load(path: &Path) -> Option<(Job, Prepared)> {
+        let job = job_file::load_with(path, &part::Faces).ok()?;
+        let (job, mut prepared) = direction::choose(job).ok()?;
+        add_links(&job, &mut prepared).ok()?;
+        Some((job, prepared))
+    }
 
     /// Three faces of the blade: each run begins where the one before ended, below the safe height, the last one comes home. A job that names its safe height has its runs begin
     /// and end at home.
@@ -118,7 +126,7 @@ mod tests {
     fn a_run_begins_where_the_one_before_ended() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("blade.toml");
-        let blade = Path::new(env!("CARGO_MANIFEST_DIR")).join("../jobs/cad/blade.step");
+        let blade = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../jobs/cad/blade.step");
         let text = |machine: &str| {
             format!(
                 "[part]\npath = {blade:?}\n[tool]\nkind = \"ball\"\nradius_mm = 3\n[cut]\nfeed_mm_min = 3000\nscallop_mm = 0.3\npattern = \"zigzag\"\nalong = \"u\"\n\
@@ -128,8 +136,7 @@ mod tests {
         let ends = |machine: &str| {
             std::fs::write(&file, text(machine)).unwrap();
             let faces = job_file::jobs_of(&file).unwrap();
-            let load = |path: &PathBuf| home::load(path, None, None, None);
-            let stops = stops(&faces, load).unwrap();
+            let stops = stops(&faces, |path: &PathBuf| load(path)).unwrap();
             let run = |(face, stop): (&PathBuf, Stop)| {
                 let (mut job, mut prepared) = load(face).unwrap();
                 stop.apply(&mut job, &mut prepared);
@@ -150,7 +157,8 @@ mod tests {
         let home_nm = [0, 0, 90_000_000];
         let chained = ends("");
         for pair in chained.windows(2) {
-            let distance = millimetres(pair[0].1).distance(millimetres(pair[1].0));
+            let [end, start] = [pair[0].1, pair[1].0].map(|nm| DVec3::from(position_mm(nm)));
+            let distance = end.distance(start);
             assert!(distance < 1e-3, "{distance} mm: {chained:?}");
             assert!(pair[0].1[2] < pair[0].2, "{chained:?}");
         }

@@ -19,36 +19,41 @@ const BESIDE: usize = 3;
 /// Share of the area that may be left for the faster direction.
 const LEFT_SHARE: f64 = 0.005;
 
-/// What the passes are made for.
+/// Estimates the passes of a face.
 #[derive(Clone, Copy)]
-pub(super) struct Passes<'a> {
-    pub(super) surface: &'a oracle::Surface,
-    pub(super) region: &'a Region,
-    pub(super) step_over_mm: f64,
-    pub(super) feed_mm_s: f64,
+pub(crate) struct PassEstimator<'a> {
+    pub(crate) surface: &'a oracle::Surface,
+    pub(crate) region: &'a Region,
+    pub(crate) step_over_mm: f64,
+    pub(crate) feed_mm_s: f64,
     /// Every other pass goes back.
-    pub(super) is_zigzag: bool,
+    pub(crate) is_zigzag: bool,
     /// Places of the face, each with its area.
-    pub(super) places: &'a [([f64; 2], f64)],
+    pub(crate) places: &'a [([f64; 2], f64)],
 }
 
-/// The passes along a parameter.
-pub(super) struct Effort {
-    pub(super) along: Along,
+/// The passes of a face along a parameter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PassEstimate {
+    /// The parameter.
+    pub along: Along,
     /// Their time, s.
-    pub(super) time_s: f64,
-    /// Share of the places that they leave too high.
-    pub(super) left: f64,
-    /// (u, v) at the start of the first and at the end of the last one.
-    pub(super) ends: Option<[[f64; 2]; 2]>,
+    pub time_s: f64,
+    /// Share of the face's area that they leave above the scallop limit.
+    pub left_share: f64,
+    /// (u, v) at the start of the first and at the end of the last one; `None` without passes.
+    pub ends: Option<[[f64; 2]; 2]>,
 }
 
-/// Whether passes of this time and share that they leave are better than others: less time, of those that leave little, else less that is left.
-pub(super) fn is_better([time_s, left]: [f64; 2], [other_s, other_left]: [f64; 2]) -> bool {
-    match [left, other_left].map(|left| left <= LEFT_SHARE) {
-        [true, true] => time_s < other_s,
-        [false, false] => left < other_left,
-        [is_better, _] => is_better,
+impl PassEstimate {
+    /// Whether these passes are better than others: less time, of those that leave little, else less that is left.
+    #[must_use]
+    pub fn is_better_than(&self, other: &Self) -> bool {
+        match [self, other].map(|estimate| estimate.left_share <= LEFT_SHARE) {
+            [true, true] => self.time_s < other.time_s,
+            [false, false] => self.left_share < other.left_share,
+            [is_better, _] => is_better,
+        }
     }
 }
 
@@ -74,12 +79,11 @@ const fn swapped_ranges(along: Along, [u, v]: [[f64; 2]; 2]) -> [[f64; 2]; 2] {
     }
 }
 
-impl Passes<'_> {
+impl PassEstimator<'_> {
     /// The direction that takes less time, of those that leave little; else the one that leaves less.
-    pub(super) fn best(&self) -> Effort {
-        let [u, v] = [Along::U, Along::V].map(|along| self.effort(along));
-        let is_v = is_better([v.time_s, v.left], [u.time_s, u.left]);
-        if is_v { v } else { u }
+    pub(crate) fn best(&self) -> PassEstimate {
+        let [u, v] = [Along::U, Along::V].map(|along| self.along(along));
+        if v.is_better_than(&u) { v } else { u }
     }
 
     /// Length of the derivative along a pass, and of that across it the whole and what is at right angles.
@@ -105,7 +109,8 @@ impl Passes<'_> {
         2.0 * across * whole / (across + whole).max(f64::MIN_POSITIVE)
     }
 
-    pub(super) fn effort(&self, along: Along) -> Effort {
+    /// The passes along a parameter.
+    pub(crate) fn along(&self, along: Along) -> PassEstimate {
         let edges: Vec<[[f64; 2]; 2]> = self
             .region
             .edges()
@@ -135,10 +140,10 @@ impl Passes<'_> {
             };
             side = (side + step.max(least)).min(last);
         }
-        Effort {
+        PassEstimate {
             along,
             time_s,
-            left: self.left(along, &lines),
+            left_share: self.left_share(along, &lines),
             ends: self.ends(along, &lines),
         }
     }
@@ -194,7 +199,7 @@ impl Passes<'_> {
     }
 
     /// Share of the places that are too far from every pass.
-    fn left(&self, along: Along, lines: &[Line]) -> f64 {
+    fn left_share(&self, along: Along, lines: &[Line]) -> f64 {
         let within_mm = 0.5 * self.step_over_mm * HIGHER.sqrt();
         let (mut all, mut left) = (0.0, 0.0);
         for (place, area) in self.places {
@@ -220,7 +225,7 @@ impl Passes<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::{LEFT_SHARE, Passes};
+    use super::{LEFT_SHARE, PassEstimator};
     use job::{Along, Region};
 
     /// A plane of 20 mm x 10 mm whose region ends on a line that is slanted by 1 in 20 to u: passes along u take less time, but leave a strip there.
@@ -237,7 +242,7 @@ mod tests {
             .filter(|[u, v]| *v < 5.0 + u / 20.0)
             .map(|place| (place, 0.005))
             .collect();
-        let passes = Passes {
+        let passes = PassEstimator {
             surface: &surface,
             region: &region,
             step_over_mm: 0.5,
@@ -245,13 +250,18 @@ mod tests {
             is_zigzag: true,
             places: &places,
         };
-        let [u, v] = [Along::U, Along::V].map(|along| passes.effort(along));
+        let [u, v] = [Along::U, Along::V].map(|along| passes.along(along));
         assert!(u.time_s < v.time_s, "{} {}", u.time_s, v.time_s);
-        assert!(u.left > LEFT_SHARE && v.left < 0.001, "{} {}", u.left, v.left);
+        assert!(
+            u.left_share > LEFT_SHARE && v.left_share < 0.001,
+            "{} {}",
+            u.left_share,
+            v.left_share
+        );
         assert_eq!(passes.best().along, Along::V);
         // Without the slanted end nothing is left, and the faster one is taken.
         let whole = Region::new(vec![vec![[0.0, 0.0], [20.0, 0.0], [20.0, 6.5], [0.0, 6.5]]]);
-        let passes = Passes {
+        let passes = PassEstimator {
             region: &whole,
             ..passes
         };

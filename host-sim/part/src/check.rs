@@ -1,0 +1,156 @@
+//! The check of a run against the whole part: verdicts on the depth of the tool, and on what the passes leave of the reachable face.
+
+use glam::DVec3;
+use job::Job;
+use job::units::MM_PER_NM;
+use job_file::FaceError;
+use oracle::PassSample;
+
+use crate::faces::Asked;
+use crate::inside::Inside;
+use crate::proof::{Deepest, LEFTOVER_SHARE, LEFTOVER_SIDE, Leftover, Passes, along, deepest, leftover};
+
+/// Centres further apart than this, in radii of the ball, are not of one pass.
+const JUMP_RADII: f64 = 1.0;
+/// Share of the reachable area that is within the scallop limit, at least.
+const WITHIN_SHARE: f64 = 0.99;
+
+/// The ball's centres on the passes of a run.
+#[derive(Clone, Debug, Default)]
+pub struct PassCentres {
+    centres: Vec<DVec3>,
+    samples: Vec<(u64, u32)>,
+}
+
+impl PassCentres {
+    /// Adds a sample of a pass; samples come in the order of the run.
+    pub fn add(&mut self, sample: &PassSample) {
+        self.centres
+            .push(DVec3::from(sample.cl_nm.map(f64::from)) * MM_PER_NM);
+        self.samples.push((sample.tick, sample.pass));
+    }
+
+    /// The pieces of the passes.
+    fn pieces(&self, radius_mm: f64) -> Vec<[DVec3; 2]> {
+        let pairs = self.centres.windows(2).zip(self.samples.windows(2));
+        let joined = pairs.filter(|(ends, samples)| {
+            samples[0].1 == samples[1].1
+                && samples[1].0 == samples[0].0 + 1
+                && ends[0].distance(ends[1]) < JUMP_RADII * radius_mm
+        });
+        joined.map(|(ends, _)| [ends[0], ends[1]]).collect()
+    }
+}
+
+/// A run against the whole part: the depth of the tool, and what the passes leave.
+#[derive(Clone, Debug)]
+pub struct PartCheck {
+    /// The deepest place of the tool in the part on the passes and between them; `None`: the job names no part.
+    pub deepest: Option<[Option<Deepest>; 2]>,
+    /// Numbers of centres that were looked at: on passes, between them.
+    pub counts: [usize; 2],
+    /// Greatest depth that is allowed, mm.
+    pub tolerance_mm: f64,
+    /// What the passes leave of the reachable part of the face.
+    pub leftover: Leftover,
+    /// Tick of the deepest place on the passes.
+    pub tick: Option<u64>,
+    /// Reasons against the job.
+    pub failures: Vec<String>,
+    /// What the check does not cover, and too large a leftover.
+    pub warnings: Vec<String>,
+}
+
+/// Checks the run of a job whose region was made from a face, with the ball's centres on its links, mm; `None` for other jobs.
+///
+/// # Errors
+/// A CAD file cannot be read.
+pub fn check_run(
+    job: &Job,
+    centres: &PassCentres,
+    links_mm: &[Vec<DVec3>],
+) -> Result<Option<PartCheck>, FaceError> {
+    let (Some(source), Some(reach)) = (job.origin.cad(), job.origin.reach()) else {
+        return Ok(None);
+    };
+    let asked = Asked::new(job, source)?;
+    let request = asked.request();
+    let between: Vec<DVec3> = links_mm.iter().flat_map(|way| along(way)).collect();
+    let deepest = asked
+        .part()
+        .map(|part| [&centres.centres, &between].map(|centres| deepest(part, asked.tool(), centres)));
+    let places = request.places(&Inside::new(request.trimmed), LEFTOVER_SIDE);
+    let passes = Passes::new(centres.pieces(job.radius_mm));
+    let leftover = leftover(&request.clearance(), &places, &passes, job.scallop_mm);
+    let tick = deepest
+        .and_then(|[on_passes, _]| on_passes)
+        .and_then(|found| centres.samples.get(found.index))
+        .map(|(tick, _)| *tick);
+    let mut check = PartCheck {
+        deepest,
+        counts: [centres.centres.len(), between.len()],
+        tolerance_mm: request.touch_mm,
+        leftover,
+        tick,
+        failures: Vec::new(),
+        warnings: Vec::new(),
+    };
+    check.judge(reach.unknown.len());
+    Ok(Some(check))
+}
+
+impl PartCheck {
+    fn judge(&mut self, unknown: usize) {
+        for (found, place) in self.deepest.iter().flatten().zip(["on a pass", "between passes"]) {
+            if let Some(found) = found.filter(|found| self.is_too_deep(found)) {
+                self.failures.push(format!(
+                    "the {} enters face {} of the part by {:.4} mm {place}, more than {} mm",
+                    found.part.name(),
+                    found.face,
+                    found.depth_mm,
+                    self.tolerance_mm
+                ));
+            }
+        }
+        if self.deepest.is_none() {
+            self.warnings.push(
+                "the neighbouring faces are not known to the job: whether the tool cuts them is not checked; name their file in [part]"
+                    .to_owned(),
+            );
+        }
+        if unknown > 0 {
+            self.warnings.push(format!(
+                "{unknown} faces of the part are not known: whether the tool cuts them is not checked"
+            ));
+        }
+        if self.leftover.within_mm2 < WITHIN_SHARE * self.leftover.reachable_mm2 {
+            self.warnings.push(format!(
+                "{:.2} % of the reachable area is within {} times the scallop limit, less than {} %",
+                100.0 * self.within_share(),
+                1.0 + LEFTOVER_SHARE,
+                100.0 * WITHIN_SHARE
+            ));
+        }
+    }
+
+    /// Whether the tool enters the part deeper than allowed.
+    #[must_use]
+    pub fn is_too_deep(&self, found: &Deepest) -> bool {
+        found.depth_mm > self.tolerance_mm
+    }
+
+    /// Share of the reachable area that is within the scallop limit; 0 where nothing is reached.
+    #[must_use]
+    pub fn within_share(&self) -> f64 {
+        let Leftover {
+            reachable_mm2,
+            within_mm2,
+            ..
+        } = self.leftover;
+        if reachable_mm2 > 0.0 {
+            within_mm2 / reachable_mm2
+        } else {
+            0.0
+        }
+    }
+}
