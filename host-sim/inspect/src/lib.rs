@@ -17,6 +17,6 @@ mod verification;
 pub use curved::{CurvedFigures, PathFigures, curved_figures, path_and_crests, path_figures};
 pub use error::InspectError;
 pub use fault::FaultAt;
-pub use run::{PassDigest, TimedRun, load_error, oracle, survey_run, time_run};
+pub use run::{PassDigest, TimedRun, centres_of_run, load_error, oracle, survey_run, time_run};
 pub use sample::{is_on_pass, plain};
 pub use verification::{BOUNDS, Requirements, RunMeasurements, Verification, verify_run};

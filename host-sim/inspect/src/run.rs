@@ -2,7 +2,9 @@
 
 use std::time::Instant;
 
+use glam::DVec3;
 use interp_core::{Fault, SpanParameter};
+use job::units::MM_PER_NM;
 use job::{Job, JobError};
 use machine::Machine;
 use machine::prepare::Prepared;
@@ -130,6 +132,22 @@ pub fn time_run(job: &Job, prepared: &Prepared, progress: &dyn Progress) -> Resu
         passes,
         fault,
     })
+}
+
+/// The centres of the ball of a run, mm, and the fault that stopped it.
+///
+/// # Errors
+/// The core refuses the job.
+pub fn centres_of_run(job: &Job, prepared: &Prepared) -> Result<(Vec<DVec3>, Option<FaultAt>), JobError> {
+    let mut centres_mm = Vec::new();
+    let mut machine = machine(job, prepared)?;
+    let ran = machine.run(|sample| {
+        centres_mm.push(DVec3::from(sample.cl_nm.map(f64::from)) * MM_PER_NM);
+        true
+    });
+    let fault = ran.err();
+    let fault = fault.map(|fault| FaultAt::of(fault, &machine, centres_mm.len() as u64, prepared));
+    Ok((centres_mm, fault))
 }
 
 /// Runs the core, measures every sample, and writes the trace if one is given. `samples`: expected number; `each`: called for every

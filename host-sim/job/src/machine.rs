@@ -246,6 +246,13 @@ impl MachineSpec {
         self.period_us * 1e-6
     }
 
+    /// Time of a number of ticks, s.
+    #[must_use]
+    #[allow(clippy::cast_precision_loss, reason = "below 2^53")]
+    pub fn time_s(&self, ticks: u64) -> f64 {
+        ticks as f64 * self.period_s()
+    }
+
     /// Whether the job runs within limits of the axes, from standstill to standstill.
     #[must_use]
     pub const fn has_limits(&self) -> bool {

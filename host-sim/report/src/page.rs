@@ -134,7 +134,7 @@ fn remarks(out: &mut String, content: &Content<'_>) {
 fn tiles(out: &mut String, content: &Content<'_>) {
     let (job, findings) = (content.job, content.findings);
     let report = &findings.report;
-    let time_s = findings.samples as f64 * job.machine.period_s();
+    let time_s = job.machine.time_s(findings.samples);
     let scallops = content.remarks.scallops.as_ref().map(Scallops::largest_mm);
     let scallop = match scallops.filter(|height| height.is_finite()) {
         Some(height) => ("Scallop height, max", fixed(height.into(), 5), "mm"),

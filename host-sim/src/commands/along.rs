@@ -5,15 +5,10 @@ use serde_json::{Map, Value, json};
 
 use job::{AlongChoice, DirectionTrial, Job, SpacingTrial, Start, StartChoice};
 
-#[allow(clippy::cast_precision_loss, reason = "below 2^53")]
-fn seconds(job: &Job, ticks: u64) -> f64 {
-    ticks as f64 * job.machine.period_s()
-}
-
 /// The keys `along` and `along_auto`: null where the job file names the direction.
 pub(super) fn json(job: &Job) -> Map<String, Value> {
     let trial = |trial: &DirectionTrial| {
-        let time_s = seconds(job, trial.ticks);
+        let time_s = job.machine.time_s(trial.ticks);
         json!({
             "ticks": trial.ticks,
             "machining_time_s": trial.rejection.is_none().then_some(time_s),
@@ -27,7 +22,7 @@ pub(super) fn json(job: &Job) -> Map<String, Value> {
     let started = |trial: &SpacingTrial| {
         json!({
             "ticks": trial.ticks,
-            "machining_time_s": trial.rejection.is_none().then_some(seconds(job, trial.ticks)),
+            "machining_time_s": trial.rejection.is_none().then_some(job.machine.time_s(trial.ticks)),
             "against": trial.rejection,
         })
     };
@@ -57,7 +52,7 @@ pub(super) fn sentence(job: &Job) -> String {
     if let Some(rejection) = &other.rejection {
         return format!("{chosen}, chosen; along {}: {rejection}", other.along.name());
     }
-    let minutes = |trial: &DirectionTrial| seconds(job, trial.ticks) / 60.0;
+    let minutes = |trial: &DirectionTrial| job.machine.time_s(trial.ticks) / 60.0;
     let (least, most) = (minutes(mine), minutes(other));
     let less = 100.0 * (1.0 - least / most.max(f64::MIN_POSITIVE));
     format!(
@@ -83,7 +78,7 @@ pub(super) fn start_sentence(job: &Job) -> Option<String> {
     if let Some(rejection) = &other.rejection {
         return Some(format!("{chosen}, chosen; {from}: {rejection}"));
     }
-    let [least, most] = [mine, other].map(|trial| seconds(job, trial.ticks) / 60.0);
+    let [least, most] = [mine, other].map(|trial| job.machine.time_s(trial.ticks) / 60.0);
     let less = 100.0 * (1.0 - least / most.max(f64::MIN_POSITIVE));
     Some(format!(
         "{chosen}, chosen: {least:.2} min, {less:.1} % less than the {most:.2} min {from}"

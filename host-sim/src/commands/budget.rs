@@ -9,7 +9,7 @@ use clap::Args;
 use serde_json::{Map, Value, json};
 
 use super::out::{say, say_part};
-use super::{Failure, Result, along, cannot_write, load, progress, read_job, spinner};
+use super::{Failure, Result, along, cannot_write, load, load_without_links, progress, spinner};
 use cycles::figures::{Figure, Histogram, Model, STEPS_2_TO_4, figures, histogram};
 use cycles::graph::{self, Analysis, EXCEPTION_BYTES};
 use cycles::image::{self, Sizes};
@@ -17,7 +17,6 @@ use cycles::measure::{MeasurementSetup, Ticks};
 use cycles::operations::{self, Count, Operations};
 use cycles::session::MeasurementSession;
 use cycles::{self, BudgetError, PERIOD_CYCLES, TICKS, chart, golden};
-use machine::direction;
 use machine::remote::qemu;
 use study::operations::PaperRow;
 
@@ -112,7 +111,7 @@ fn count(arguments: &Arguments, setup: &MeasurementSetup) -> Result<(Vec<Counted
     for (name, path, ticks) in jobs {
         // The jobs of the table as the tests measure them: without words of links, which depend on a map of the surface.
         let (job, prepared) = if arguments.jobs.is_empty() {
-            direction::choose(read_job(&path, None)?)?
+            load_without_links(&path)?
         } else {
             load(&path)?
         };

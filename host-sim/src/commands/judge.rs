@@ -3,11 +3,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use glam::DVec3;
 use inspect::FaultAt;
 use job::Job;
-use machine::Machine;
-use machine::prepare::Prepared;
 use oracle::{AccuracyReport, PassSample, SampleCheck};
 use report::{Figure, Mark, Remarks, RidgePoint, Scallops, Sketch};
 use serde_json::{Value, json};
@@ -199,19 +196,6 @@ fn print(theirs: &Judged, ours: Option<&Judged>) {
     }
 }
 
-/// The core's own run of the job, as positions, mm; with the fault that has ended it before its end.
-fn own_run(job: &Job, prepared: &Prepared) -> Result<(Vec<DVec3>, Option<FaultAt>)> {
-    let mut centres = Vec::new();
-    let mut machine = Machine::load(prepared).map_err(|fault| inspect::load_error(job, fault))?;
-    let ran = machine.run(|sample| {
-        centres.push(DVec3::from(sample.cl_nm.map(f64::from)) * 1e-6);
-        true
-    });
-    let fault = ran.err();
-    let fault = fault.map(|fault| FaultAt::of(fault, &machine, centres.len() as u64, prepared));
-    Ok((centres, fault))
-}
-
 /// The core's own run, judged.
 struct OwnRun {
     judged: Judged,
@@ -343,7 +327,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let own = if arguments.alone {
         None
     } else {
-        let (centres_mm, fault) = own_run(&own_job, &prepared)?;
+        let (centres_mm, fault) = inspect::centres_of_run(&own_job, &prepared)?;
         let judged = judge(&own_job, &oracle, &centres_mm, None, progress);
         Some(OwnRun { judged, fault })
     };

@@ -311,21 +311,32 @@ fn load(path: &Path) -> Result<(Job, Prepared)> {
     settled(read_job(path, None)?)
 }
 
-/// Chooses the direction of a job if `along = "auto"`, the start if `start = "auto"`, and prepares it.
+/// Reads and prepares a job as [`load`] does, without the words of its links.
+#[cfg(feature = "developer")]
+fn load_without_links(path: &Path) -> Result<(Job, Prepared)> {
+    chosen(read_job(path, None)?)
+}
+
+/// Chooses direction and start of a job as [`chosen`] does, and gives it the words of its links.
 fn settled(job: Job) -> Result<(Job, Prepared)> {
-    let (job, mut prepared) = if job.origin.has_to_choose() {
+    let (job, mut prepared) = chosen(job)?;
+    add_links(&job, &mut prepared)?;
+    Ok((job, prepared))
+}
+
+/// Chooses the direction of a job if `along = "auto"`, the start if `start = "auto"`, and prepares it.
+fn chosen(job: Job) -> Result<(Job, Prepared)> {
+    if job.origin.has_to_choose() {
         let bar = spinner(match job.origin.along_choice() {
             AlongChoice::Auto => "running along u and along v",
             _ => "running from the edge and from the middle",
         });
         let settled = direction::choose(job);
         bar.finish_and_clear();
-        settled?
+        Ok(settled?)
     } else {
-        direction::choose(job)?
-    };
-    add_links(&job, &mut prepared)?;
-    Ok((job, prepared))
+        Ok(direction::choose(job)?)
+    }
 }
 
 /// Refuses passes of a region, which only the board makes.

@@ -62,9 +62,7 @@ fn span(span: &SpeedRange) -> Value {
 
 impl Outcome<'_> {
     fn machining_time_s(&self) -> f64 {
-        #[allow(clippy::cast_precision_loss, reason = "below 2^53")]
-        let ticks = self.findings.samples as f64;
-        ticks * self.job.machine.period_s()
+        self.job.machine.time_s(self.findings.samples)
     }
 
     /// The keys of `simulate`, the same for all approaches.

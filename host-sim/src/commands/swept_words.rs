@@ -13,16 +13,6 @@ use verify::{Verdict, survey};
 /// Capacity of the board for surface data, bytes.
 const STORE_BYTES: usize = STORE_WORDS * size_of::<i32>();
 
-fn data_bytes(prepared: &Prepared) -> usize {
-    size_of_val(prepared.words.as_slice())
-}
-
-fn time_s(job: &Job, samples: u64) -> f64 {
-    #[allow(clippy::cast_precision_loss, reason = "below 2^53")]
-    let ticks = samples as f64;
-    ticks * job.machine.period_s()
-}
-
 /// The keys of `verify`.
 pub(super) fn json(
     job: &Job,
@@ -79,9 +69,9 @@ pub(super) fn json(
         "least_concave_radius": concave,
         "poles": found.shape.poles,
         "degenerate_places": found.shape.degenerate.map_or(0, |(count, _)| count),
-        "machining_time_s": time_s(job, survey.samples),
+        "machining_time_s": job.machine.time_s(survey.samples),
         "patches": prepared.patches(),
-        "data_bytes": data_bytes(prepared),
+        "data_bytes": prepared.data_bytes(),
         "data_bytes_max": STORE_BYTES,
         "stations": found.stations,
         "not_measured": not_measured(found, axes),
@@ -220,9 +210,9 @@ pub(super) fn print(
     }
     row(
         "machining time",
-        &format!("{:.2} min", time_s(job, survey.samples) / 60.0),
+        &format!("{:.2} min", job.machine.time_s(survey.samples) / 60.0),
     );
-    let bytes = data_bytes(prepared);
+    let bytes = prepared.data_bytes();
     row(
         "surface data",
         &format!(

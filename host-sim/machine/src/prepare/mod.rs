@@ -105,7 +105,13 @@ impl Prepared {
     /// Size of the header and of the surface's data in the machine's memory, bytes.
     #[must_use]
     pub fn bytes(&self) -> usize {
-        size_of_val(&self.header) + size_of_val(self.words.as_slice())
+        size_of_val(&self.header) + self.data_bytes()
+    }
+
+    /// Size of the surface's data in the machine's memory, bytes.
+    #[must_use]
+    pub fn data_bytes(&self) -> usize {
+        size_of_val(self.words.as_slice())
     }
 
     /// Number of patches.
