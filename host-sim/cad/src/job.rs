@@ -1,10 +1,9 @@
-//! A job file for a face: complete, with comments, ready to run.
+//! A job file for a face: complete, with comments, ready to run. This file chooses side, ball and place; `text.rs` writes.
 
-use std::fmt::Write;
+mod text;
 
 use super::machinable::outside;
 use super::{CadError, Face, Form, MachinableFace, Measures, measure};
-use job::{NurbsSpec, one_line};
 use oracle::{Surface, facing};
 
 /// Standard radii of ball-end mills for the automatic choice, mm.
@@ -27,13 +26,6 @@ pub const LIMITS: &str = "# Axis limits: put in those of the machine, or run wit
      velocity_max_mm_s = [100, 100, 50]\n\
      acceleration_max_mm_s2 = [1000, 1000, 500]\n\
      jerk_max_mm_s3 = [20000, 20000, 10000]\n";
-/// The same for a face by itself, which may be for studying the geometry.
-const NO_LIMITS: &str = "# A machine's axis limits, or its profile (--machine FILE): without them the job is for studying the geometry.\n\
-     # velocity_max_mm_s = [100, 100, 50]\n\
-     # acceleration_max_mm_s2 = [1000, 1000, 500]\n\
-     # jerk_max_mm_s3 = [20000, 20000, 10000]\n";
-/// Digits of a written coordinate: full precision of f64.
-const COLUMN: usize = 100;
 
 /// Scallop height limit of a job that is given none, mm, for a ball of this radius, mm.
 #[must_use]
@@ -115,269 +107,191 @@ fn ball(concave_mm: Option<f64>, size_mm: f64) -> Option<f64> {
 /// Writes a job for a face. `source` says where it came from, for the comment.
 ///
 /// # Errors
-/// No standard ball fits, and the options give none.
+/// No standard ball fits, and the options give none; the job must name the file and cannot.
 pub fn write_job(
     source: &str,
     face: &Face,
     surface: &MachinableFace,
     options: &JobOptions,
 ) -> Result<JobText, CadError> {
-    let measures = measure(&surface.spec());
-    let by_region = options.in_part || is_of_part(surface);
-    let (chosen, sign) = match (by_region, side(face, &measures)) {
+    let writer = JobWriter::new(source, face, surface, options)?;
+    Ok(JobText {
+        text: writer.text(),
+        radius_mm: writer.radius_mm,
+        side: writer.side,
+        measures: writer.measures,
+        warnings: writer.warnings,
+    })
+}
+
+/// A face, its surface, and what was chosen for its job.
+struct JobWriter<'a> {
+    source: &'a str,
+    face: &'a Face,
+    surface: &'a MachinableFace,
+    options: &'a JobOptions,
+    measures: Measures,
+    /// The job names the face and its part, and is given a region.
+    by_region: bool,
+    /// Side of the tool, as in job files, and its sign on `S_u x S_v`.
+    side: String,
+    sign: f64,
+    radius_mm: f64,
+    /// The surface is placed with its centre at the origin.
+    centred: bool,
+    warnings: Vec<String>,
+}
+
+impl<'a> JobWriter<'a> {
+    fn new(
+        source: &'a str,
+        face: &'a Face,
+        surface: &'a MachinableFace,
+        options: &'a JobOptions,
+    ) -> Result<Self, CadError> {
+        let measures = measure(&surface.spec());
+        let by_region = options.in_part || is_of_part(surface);
+        let (side, sign) = chosen_side(face, &measures, by_region, options.side.as_deref());
+        let concave_mm = measures.concave_mm[usize::from(sign < 0.0)];
+        let size_mm = measures.size_mm().into_iter().fold(0.0, f64::max);
+        let ball = options.radius_mm.or_else(|| ball(concave_mm, size_mm));
+        let radius_mm = ball.ok_or_else(|| no_ball(source, face, concave_mm, size_mm))?;
+        if by_region && options.source.is_none() {
+            return Err(CadError::face(
+                source,
+                format!(
+                    "the job of face {} must name its file, and cannot name {source:?}",
+                    face.number
+                ),
+                "give the CAD file a plain name, or machine the whole rectangle around the face with --untrimmed",
+            ));
+        }
+        let mut writer = Self {
+            source,
+            face,
+            surface,
+            options,
+            centred: far_mm(&measures) > REACH_MM && !options.in_part,
+            measures,
+            by_region,
+            side,
+            sign,
+            radius_mm,
+            warnings: Vec::new(),
+        };
+        writer.warnings = [
+            writer.outline_warning(),
+            writer.form_warning(),
+            writer.fit_warning(),
+            writer.undercut_warning(),
+            writer.place_warning(),
+        ]
+        .into_iter()
+        .flatten()
+        .collect();
+        Ok(writer)
+    }
+
+    /// A trimmed face whose whole surface is machined.
+    fn outline_warning(&self) -> Option<String> {
+        let outline = &self.surface.outline;
+        let why = outline
+            .trimmed
+            .as_ref()
+            .filter(|_| self.surface.trimmed.is_none())?;
+        Some(if outline.unknown {
+            format!("{why}; the whole surface is machined, wherever the face on it ends")
+        } else {
+            format!("the face is trimmed ({why}); the whole rectangle of the surface around it is machined")
+        })
+    }
+
+    /// An approximated surface.
+    fn form_warning(&self) -> Option<String> {
+        let Form::Fitted { why, deviation } = &self.surface.form else {
+            return None;
+        };
+        Some(format!(
+            "approximated, for {why}: within {:.6} mm of the face and {:.6} rad of its normal, measured at {} places",
+            deviation.max_mm, deviation.normal_rad, deviation.places
+        ))
+    }
+
+    /// A surface more concave than the ball.
+    fn fit_warning(&self) -> Option<String> {
+        let radius_mm = self.radius_mm;
+        let concave_mm = self.measures.concave_mm[usize::from(self.sign < 0.0)];
+        let concave_mm = concave_mm.filter(|concave_mm| *concave_mm <= radius_mm)?;
+        Some(format!(
+            "the least concave radius on the machined side is {concave_mm:.4} mm: the ball of {radius_mm} mm does not fit"
+        ))
+    }
+
+    /// A surface that looks down, which no region leaves out.
+    fn undercut_warning(&self) -> Option<String> {
+        if self.by_region {
+            return None;
+        }
+        let facing = facing(&Surface::new(&self.surface.spec()), self.sign);
+        let turn = facing.turn_deg.map_or_else(
+            || "no turn makes all of it look up".to_owned(),
+            |turn| format!("rotate_deg = {turn:?} in [placement] turns it up"),
+        );
+        (facing.down_share > 0.0).then(|| {
+            format!(
+                "{:.2} % of the machined side looks down, where no tool along z can cut; {turn}",
+                100.0 * facing.down_share
+            )
+        })
+    }
+
+    /// A surface beyond the machine's range.
+    fn place_warning(&self) -> Option<String> {
+        self.centred.then(|| {
+            format!(
+                "it lies up to {:.0} mm from the origin, the machine's range is 2147 mm; it is placed with its centre at the origin",
+                far_mm(&self.measures)
+            )
+        })
+    }
+}
+
+/// Side of the tool, as in job files, and its sign on `S_u x S_v`.
+fn chosen_side(face: &Face, measures: &Measures, by_region: bool, given: Option<&str>) -> (String, f64) {
+    let (chosen, sign) = match (by_region, side(face, measures)) {
         // The surface around a face may face another way than the face.
         (true, (_, sign)) => (if sign > 0.0 { "+" } else { "-" }, sign),
         (false, chosen) => chosen,
     };
-    let side = options.side.clone().unwrap_or_else(|| chosen.to_owned());
+    let side = given.unwrap_or(chosen).to_owned();
     let sign = match side.as_str() {
         "+" => 1.0,
         "-" => -1.0,
         "up" => measures.facing[2].signum(),
         _ => sign,
     };
-    let concave_mm = measures.concave_mm[usize::from(sign < 0.0)];
-    let size_mm = measures.size_mm().into_iter().fold(0.0, f64::max);
-    let radius_mm = options.radius_mm.or_else(|| ball(concave_mm, size_mm)).ok_or_else(|| {
-        let [least, ..] = RADII_MM;
-        let room = match concave_mm {
-            Some(concave_mm) if concave_mm < size_mm => format!("its least concave radius is {concave_mm:.4} mm"),
-            _ => format!("it is {size_mm:.4} mm long"),
-        };
-        CadError::face(
-            source,
-            format!("face {}: {room}, no standard ball (from {least} mm) fits", face.number),
-            "give the ball with --radius-mm R (verify shows where it does not fit), or choose another side with --side",
-        )
-    })?;
-    let mut warnings = Vec::new();
-    if by_region && options.source.is_none() {
-        return Err(CadError::face(
-            source,
-            format!(
-                "the job of face {} must name its file, and cannot name {source:?}",
-                face.number
-            ),
-            "give the CAD file a plain name, or machine the whole rectangle around the face with --untrimmed",
-        ));
-    }
-    if let Some(why) = surface
-        .outline
-        .trimmed
-        .as_ref()
-        .filter(|_| surface.trimmed.is_none())
-    {
-        warnings.push(if surface.outline.unknown {
-            format!("{why}; the whole surface is machined, wherever the face on it ends")
-        } else {
-            format!("the face is trimmed ({why}); the whole rectangle of the surface around it is machined")
-        });
-    }
-    if let Form::Fitted { why, deviation } = &surface.form {
-        warnings.push(format!(
-            "approximated, for {why}: within {:.6} mm of the face and {:.6} rad of its normal, measured at {} places",
-            deviation.max_mm, deviation.normal_rad, deviation.places
-        ));
-    }
-    if let Some(concave_mm) = concave_mm.filter(|concave_mm| *concave_mm <= radius_mm) {
-        warnings.push(format!(
-            "the least concave radius on the machined side is {concave_mm:.4} mm: the ball of {radius_mm} mm does not fit"
-        ));
-    }
-    let facing = facing(&Surface::new(&surface.spec()), sign);
-    if facing.down_share > 0.0 && !by_region {
-        let turn = facing.turn_deg.map_or_else(
-            || "no turn makes all of it look up".to_owned(),
-            |turn| format!("rotate_deg = {turn:?} in [placement] turns it up"),
-        );
-        warnings.push(format!(
-            "{:.2} % of the machined side looks down, where no tool along z can cut; {turn}",
-            100.0 * facing.down_share
-        ));
-    }
-    let far_mm = measures
-        .corners_mm
-        .iter()
-        .flatten()
-        .fold(0.0_f64, |far, x| far.max(x.abs()));
-    let centred = far_mm > REACH_MM && !options.in_part;
-    if centred {
-        warnings.push(format!(
-            "it lies up to {far_mm:.0} mm from the origin, the machine's range is 2147 mm; it is placed with its centre at the origin"
-        ));
-    }
-    let text = text(
-        source, face, surface, options, &measures, &warnings, radius_mm, &side, centred,
-    );
-    Ok(JobText {
-        text,
-        radius_mm,
-        side,
-        measures,
-        warnings,
-    })
+    (side, sign)
 }
 
-#[allow(clippy::too_many_arguments, reason = "all of them are of one file")]
-fn text(
-    source: &str,
-    face: &Face,
-    surface: &MachinableFace,
-    options: &JobOptions,
-    measures: &Measures,
-    warnings: &[String],
-    radius_mm: f64,
-    side: &str,
-    centred: bool,
-) -> String {
-    let mut out = String::new();
-    let size = measures.size_mm();
-    let _ = writeln!(
-        out,
-        "# Face {} ({}, {}) of {}: {:.3} x {:.3} x {:.3} mm, {} patches{}.",
-        face.number,
-        one_line(&face.entity),
-        face.surface.kind(),
-        one_line(source),
-        size[0],
-        size[1],
-        size[2],
-        surface.patches,
-        if surface.form == Form::Exact {
-            ", exact"
-        } else {
-            ""
-        }
-    );
-    for warning in warnings {
-        let _ = writeln!(out, "# Note: {}.", one_line(warning));
-    }
-    out.push('\n');
-    let of_file = options
-        .source
-        .as_ref()
-        .filter(|_| options.in_part || is_of_part(surface));
-    if let Some((path, tolerance_mm)) = of_file {
-        // Its region is made when the job is read.
-        let _ = writeln!(
-            out,
-            "[surface]\nkind = \"file\"\npath = {path:?}\nface = {}\ntolerance_mm = {tolerance_mm}\nparameters = {:?}      # \"edges\": of four edges of the face where it has them; \"surface\"\n\n\
-             # What must not be cut; the region of the face is what the tool reaches without cutting it.\n\
-             [part]\npath = {path:?}",
-            face.number,
-            surface.parameters.name(),
-        );
-    } else {
-        write_surface(&mut out, &surface.nurbs);
-    }
-    if let (Form::Fitted { .. }, None, Some((path, tolerance_mm))) = (&surface.form, of_file, &options.source)
-    {
-        let _ = writeln!(
-            out,
-            "# What the surface approximates: `cargo sim verify` measures against it\nsource = {path:?}\nsource_face = {}\ntolerance_mm = {tolerance_mm}",
+/// Greatest distance of the surface from the origin along an axis, mm.
+fn far_mm(measures: &Measures) -> f64 {
+    let coordinates = measures.corners_mm.iter().flatten();
+    coordinates.fold(0.0_f64, |far, x| far.max(x.abs()))
+}
+
+/// No standard ball fits.
+fn no_ball(source: &str, face: &Face, concave_mm: Option<f64>, size_mm: f64) -> CadError {
+    let [least, ..] = RADII_MM;
+    let room = match concave_mm {
+        Some(concave_mm) if concave_mm < size_mm => format!("its least concave radius is {concave_mm:.4} mm"),
+        _ => format!("it is {size_mm:.4} mm long"),
+    };
+    CadError::face(
+        source,
+        format!(
+            "face {}: {room}, no standard ball (from {least} mm) fits",
             face.number
-        );
-    }
-    if options.rotate_deg != [0.0; 3] || options.translate_mm != [0.0; 3] {
-        let _ = write!(
-            out,
-            "\n[placement]\nrotate_deg = {:?}    # of the whole part\ntranslate_mm = {:?}\n",
-            options.rotate_deg, options.translate_mm
-        );
-    } else if centred {
-        out.push_str("\n[placement]\nplace = \"centre\"            # the centre of its box, at translate_mm\ntranslate_mm = [0, 0, 0]\n");
-    }
-    let or = |given: &Option<String>, default: &str| given.clone().unwrap_or_else(|| default.to_owned());
-    let concave = match measures.concave_mm {
-        [None, None] => "the surface is not concave".to_owned(),
-        [plus, minus] => {
-            let shown =
-                |radius: Option<f64>| radius.map_or("none".to_owned(), |radius| format!("{radius:.4} mm"));
-            format!(
-                "least concave radius: {} seen from +, {} from -",
-                shown(plus),
-                shown(minus)
-            )
-        }
-    };
-    let _ = write!(
-        out,
-        "\n[tool]\nkind = \"ball\"\nradius_mm = {radius_mm}               # {concave}\n\n\
-         [cut]\n\
-         feed_mm_min = {}           # of the cutter contact along the surface\n\
-         scallop_mm = {}            # scallop height limit between passes\n\
-         along = {}                # surface parameter along a pass\n\
-         side = {}                # machined side: \"up\", or the sign on S_u x S_v\n\
-         pattern = {}              # \"zig\": every pass in the same direction; \"zigzag\": alternating\n\
-         chord_mm = 0.005            # chord error limit, for export and the approaches made of chords\n\n\
-         [machine]\n\
-         period_us = 1000            # sampling period\n{}",
-        options.feed_mm_min.unwrap_or(FEED_MM_MIN),
-        options
-            .scallop_mm
-            .unwrap_or_else(|| default_scallop_mm(radius_mm)),
-        quoted(&or(&options.along, "u")),
-        quoted(side),
-        quoted(&or(
-            &options.pattern,
-            if options.in_part { "zigzag" } else { "zig" }
-        )),
-        if options.in_part { LIMITS } else { NO_LIMITS }
-    );
-    out
-}
-
-/// A TOML string.
-fn quoted(text: &str) -> String {
-    format!(
-        "\"{}\"",
-        one_line(&text.replace('\\', "\\\\").replace('"', "\\\""))
+        ),
+        "give the ball with --radius-mm R (verify shows where it does not fit), or choose another side with --side",
     )
-}
-
-fn write_surface(out: &mut String, nurbs: &NurbsSpec) {
-    let list = |name: &str, numbers: &[f64]| {
-        let mut text = format!("{name} = [");
-        let mut column = text.len();
-        for (index, number) in numbers.iter().enumerate() {
-            let word = format!("{number}{}", if index + 1 < numbers.len() { ", " } else { "" });
-            if column + word.len() > COLUMN {
-                text.push_str("\n    ");
-                column = 4;
-            }
-            column += word.len();
-            text.push_str(&word);
-        }
-        text.push_str("]\n");
-        text
-    };
-    let _ = writeln!(
-        out,
-        "[surface]\nkind = \"nurbs\"\ndegree = [{}, {}]",
-        nurbs.degree[0], nurbs.degree[1]
-    );
-    out.push_str(&list("knots_u", &nurbs.knots_u));
-    out.push_str(&list("knots_v", &nurbs.knots_v));
-    let what = if nurbs.rational {
-        "[x, y, z, weight]"
-    } else {
-        "[x, y, z]"
-    };
-    let _ = writeln!(
-        out,
-        "# {what}; one block per pole along u, containing the poles along v\npoles_mm = ["
-    );
-    for row in &nurbs.poles_mm {
-        out.push_str("    [\n");
-        for [x, y, z, w] in row {
-            let weight = if nurbs.rational {
-                format!(", {w}")
-            } else {
-                String::new()
-            };
-            let _ = writeln!(out, "        [{x}, {y}, {z}{weight}],");
-        }
-        out.push_str("    ],\n");
-    }
-    out.push_str("]\n");
 }
