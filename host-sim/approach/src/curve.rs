@@ -7,6 +7,7 @@ use super::cubic::{Cubic, Errors, fit};
 use super::nodes::Nodes;
 use super::{Approach, ApproachError, Each, PassPath, Program};
 use job::Job;
+use job::units::S_PER_MIN;
 
 /// Tolerance of the fitted speed, as a share of the feed (from the paper).
 pub const SPEED_SHARE: f64 = 0.01;
@@ -152,11 +153,11 @@ impl Program for Spline {
                     square[axis], cube[axis]
                 );
             }
-            let [_, _, square, cube] = cubic.speed_mm_s.map(|v| v * 60.0);
+            let [_, _, square, cube] = cubic.speed_mm_s.map(|v| v * S_PER_MIN);
             let _ = writeln!(
                 out,
                 " F=FPO({:.1},{square:.1},{cube:.1})",
-                cubic.speed(1.0) * 60.0
+                cubic.speed(1.0) * S_PER_MIN
             );
         }
     }

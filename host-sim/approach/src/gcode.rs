@@ -1,5 +1,6 @@
 //! Blocks of G-code: modal words omitted where unchanged, coordinates with a resolution of 0.1 um, feeds with five digits.
 
+use job::units::S_PER_MIN;
 use std::fmt::Write;
 
 use glam::DVec3;
@@ -8,7 +9,6 @@ use glam::DVec3;
 pub const RESOLUTION_MM: f64 = 1e-4;
 /// Significant digits of a feed: relative error below 5e-5.
 const FEED_DIGITS: i32 = 5;
-const SECONDS_PER_MINUTE: f64 = 60.0;
 const AXES: [&str; 3] = ["X", "Y", "Z"];
 const OFFSETS: [&str; 3] = ["I", "J", "K"];
 
@@ -222,8 +222,8 @@ impl<'a> Blocks<'a> {
             }
         };
         let feed = match self.feed_mode {
-            FeedMode::G94 => cut.speed_mm_s * SECONDS_PER_MINUTE,
-            FeedMode::G93 => SECONDS_PER_MINUTE / cut.time_s(),
+            FeedMode::G94 => cut.speed_mm_s * S_PER_MIN,
+            FeedMode::G93 => S_PER_MIN / cut.time_s(),
         };
         self.block(motion, to, &offsets, Some(feed_digits(feed)));
     }

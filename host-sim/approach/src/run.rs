@@ -3,12 +3,11 @@
 use crate::{Approach, ApproachError, Kind, PassPath, SideCurve, side_curves};
 use glam::DVec3;
 use inspect::plain;
+use job::units::NM_PER_MM;
 use job::{Job, Pattern};
 use machine::Machine;
 use machine::prepare::{Prepared, prepare};
 use oracle::{Oracle, OracleError, PassSample};
-
-const NM_PER_MM: f64 = 1e6;
 
 /// The position of the tool after a period.
 #[derive(Clone, Copy, Debug, PartialEq)]

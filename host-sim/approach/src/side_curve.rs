@@ -3,6 +3,7 @@
 use crate::ApproachError;
 use inspect::plain;
 use job::Job;
+use job::units::{MM_PER_NM, S_PER_MIN};
 use machine::Machine;
 use machine::prepare::prepare;
 use oracle::Oracle;
@@ -96,7 +97,7 @@ pub fn side_curves(job: &Job) -> Result<Vec<SideCurve>, ApproachError> {
     }
     let mut job = job.clone();
     // At a lower feed a front may turn more sharply; without axis limits its stations are the same.
-    let densest_mm_min = 60.0 * SPACING_MM / job.machine.period_s();
+    let densest_mm_min = S_PER_MIN * SPACING_MM / job.machine.period_s();
     job.feed_mm_min = job.feed_mm_min.min(densest_mm_min);
     job.machine.limits = None;
     let prepared = prepare(&job).map_err(|error| ApproachError::Fault(error.to_string()))?;
@@ -148,7 +149,7 @@ fn distance_mm(from: [i32; 3], to: [i32; 3]) -> f64 {
     let square = from
         .iter()
         .zip(&to)
-        .map(|(from, to)| (f64::from(to - from) * 1e-6).powi(2));
+        .map(|(from, to)| (f64::from(to - from) * MM_PER_NM).powi(2));
     square.sum::<f64>().sqrt()
 }
 

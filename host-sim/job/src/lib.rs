@@ -178,7 +178,7 @@ impl Job {
     /// Feed along the surface, mm/s.
     #[must_use]
     pub fn feed_mm_s(&self) -> f64 {
-        self.feed_mm_min / 60.0
+        self.feed_mm_min / units::S_PER_MIN
     }
 
     /// The step-over on a plane, mm.

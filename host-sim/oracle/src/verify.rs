@@ -4,13 +4,11 @@ use super::contact::Oracle;
 use super::report::{AccuracyReport, SampleLocation};
 use super::smooth::SmoothParameter;
 use glam::DVec3;
+use job::units::NM_PER_MM;
 use job::{Pattern, Spacing};
 
 /// Excess of a last step over that of its feed, as a share of the programmed one, that the rounding of its parameters makes.
 const LAST_STEP_ROUNDING: f64 = 1e-5;
-
-/// Nanometres in a millimetre.
-const NM_PER_MM: f64 = 1e6;
 
 /// A sample on a pass as emitted by a machine, in plain numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,5 +1,7 @@
 //! Number formats of the pages.
 
+use job::units::S_PER_MIN;
+
 /// A count in groups of three digits.
 pub(super) fn grouped(count: u64) -> String {
     let digits = count.to_string();
@@ -71,8 +73,8 @@ fn superscript(c: char) -> Option<char> {
 /// A duration in s, min or h.
 pub(super) fn duration(seconds: f64) -> String {
     match seconds {
-        s if s < 60.0 => format!("{s:.1} s"),
-        s if s < 3600.0 => format!("{:.1} min", s / 60.0),
+        s if s < S_PER_MIN => format!("{s:.1} s"),
+        s if s < 3600.0 => format!("{:.1} min", s / S_PER_MIN),
         s => format!("{:.2} h", s / 3600.0),
     }
 }

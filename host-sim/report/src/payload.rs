@@ -9,9 +9,8 @@ use super::measure::{self, Gap};
 use super::record::PassInterval;
 use super::setting::setting;
 use glam::DVec3;
+use job::units::MM_PER_NM;
 use job::{Along, Spacing};
-
-const MM_PER_NM: f64 = 1e-6;
 
 /// Bounding box of surface and path, quantised with the same step on all axes.
 struct Box3 {

@@ -1,6 +1,7 @@
 //! Decimated record of a stream of samples, in bounded memory.
 
 use glam::DVec3;
+use job::units::MM_PER_NM;
 use job::{Along, Job, Pattern};
 use oracle::PassSample;
 
@@ -10,8 +11,6 @@ const DRAWN_MAX: usize = 60;
 const POINTS_MAX: usize = 300;
 /// Largest number of passes whose interval is stored: two per pixel of a chart.
 const INTERVALS_MAX: usize = 2048;
-
-const MM_PER_NM: f64 = 1e-6;
 
 /// A decimated stream: every `stride`-th item is stored, and the stride doubles when the capacity is reached. The last
 /// item is always stored.

@@ -1,5 +1,6 @@
 //! Data of the charts: minimum and maximum of each quantity in spans of time, so that decimation does not remove peaks.
 
+use job::units::MM_PER_NM;
 use serde_json::{Value, json};
 
 use super::embed::{Scale, words};
@@ -48,8 +49,6 @@ const REACH: usize = 8;
 /// Largest difference between the accelerations over single periods and over wide ones that is attributed to noise, nm per
 /// period². Positions are whole nanometres within some nanometres of the exact ones; a second difference has four of them.
 const NOISE_NM: f64 = 8.0;
-
-const MM_PER_NM: f64 = 1e-6;
 
 /// Minimum and maximum of each channel; NaN without values.
 type Span = [[f32; 2]; CHANNELS];

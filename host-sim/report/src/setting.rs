@@ -4,6 +4,7 @@ use serde_json::{Value, json};
 
 use super::content::Content;
 use glam::DVec3;
+use job::units::MM_PER_NM;
 use job::{Block, Job};
 
 /// Number of points of all links together, and least number for one.
@@ -50,7 +51,7 @@ pub(super) fn setting(content: &Content<'_>) -> Value {
     let (job, remarks) = (content.job, content.remarks);
     let most = (LINK_POINTS / remarks.links_mm.len().max(1)).max(LINK_POINTS_MIN);
     let block = |block: &Block| json!([block.low_mm, block.high_mm]);
-    let tops = content.track.places().map(|nm| f64::from(nm[2]) * 1e-6);
+    let tops = content.track.places().map(|nm| f64::from(nm[2]) * MM_PER_NM);
     let [low, high] = tops.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], z| {
         [low.min(z), high.max(z)]
     });

@@ -1,5 +1,6 @@
 //! The passes in the 3D view: points at equal times, each with the worst of the samples it represents.
 
+use job::units::MM_PER_NM;
 use serde_json::{Value, json};
 
 use super::embed::{column, words};
@@ -154,7 +155,7 @@ impl Track {
             self.begin_pass(sample);
         }
         let step = |k: usize| f64::from(sample.cl_nm[k]) - f64::from(self.last_cl_nm[k]);
-        let way_mm = (step(0).powi(2) + step(1).powi(2) + step(2).powi(2)).sqrt() * 1e-6;
+        let way_mm = (step(0).powi(2) + step(1).powi(2) + step(2).powi(2)).sqrt() * MM_PER_NM;
         self.last_cl_nm = sample.cl_nm;
         let Some(pass) = self.passes.last_mut().filter(|_| self.is_drawn) else {
             return;

@@ -3,6 +3,7 @@
 use inspect::{CurvedFigures, PathFigures};
 use serde_json::{Map, Value, json};
 
+use job::units::S_PER_MIN;
 use job::{AlongChoice, DirectionTrial, Job, SpacingTrial, Start, StartChoice};
 
 /// The keys `along` and `along_auto`: null where the job file names the direction.
@@ -52,7 +53,7 @@ pub(super) fn sentence(job: &Job) -> String {
     if let Some(rejection) = &other.rejection {
         return format!("{chosen}, chosen; along {}: {rejection}", other.along.name());
     }
-    let minutes = |trial: &DirectionTrial| job.machine.time_s(trial.ticks) / 60.0;
+    let minutes = |trial: &DirectionTrial| job.machine.time_s(trial.ticks) / S_PER_MIN;
     let (least, most) = (minutes(mine), minutes(other));
     let less = 100.0 * (1.0 - least / most.max(f64::MIN_POSITIVE));
     format!(
@@ -78,7 +79,7 @@ pub(super) fn start_sentence(job: &Job) -> Option<String> {
     if let Some(rejection) = &other.rejection {
         return Some(format!("{chosen}, chosen; {from}: {rejection}"));
     }
-    let [least, most] = [mine, other].map(|trial| job.machine.time_s(trial.ticks) / 60.0);
+    let [least, most] = [mine, other].map(|trial| job.machine.time_s(trial.ticks) / S_PER_MIN);
     let less = 100.0 * (1.0 - least / most.max(f64::MIN_POSITIVE));
     Some(format!(
         "{chosen}, chosen: {least:.2} min, {less:.1} % less than the {most:.2} min {from}"

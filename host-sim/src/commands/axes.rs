@@ -10,6 +10,7 @@ use super::home::{self, PositionNm};
 use super::out::say;
 use super::{Failure, Result, interrupt, numbers, run};
 use job::AXES;
+use job::units::NM_PER_MM;
 use machine::remote::Session;
 use machine::remote::axes;
 
@@ -21,8 +22,6 @@ const SLOW_MM_S: f32 = 0.5;
 /// Way back before the slow probe move, and the length of it, nm.
 const BACK_NM: i32 = 1_000_000;
 const AGAIN_NM: i32 = 2 * BACK_NM;
-
-const NM_PER_MM: f64 = 1e6;
 
 /// An axis and a distance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,5 +1,6 @@
 //! `export`: writes a job as G-code for another controller.
 
+use job::units::S_PER_MIN;
 use std::path::PathBuf;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
@@ -122,7 +123,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     );
     say!(
         "  cutting      {:.1} min, without links",
-        exported.cutting_time_s / 60.0
+        exported.cutting_time_s / S_PER_MIN
     );
     say!("  safe height  {:.4} mm", exported.safe_z_mm);
     Ok(())

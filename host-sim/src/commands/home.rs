@@ -4,12 +4,11 @@ use clap::Args;
 use protocol::message::Reason;
 
 use super::{Result, read_job, settled};
+use job::units::{MM_PER_NM, NM_PER_MM};
 use job::{Job, MachineProfile};
 use machine::prepare::Prepared;
 use machine::remote::RemoteError;
 use machine::work;
-
-const MM_PER_NM: f64 = 1e-6;
 
 /// A position of the ball centre, nm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,7 +34,7 @@ impl PositionNm {
 pub(super) fn position(text: &str) -> std::result::Result<PositionNm, String> {
     let mut axes = text.split(',').map(|axis| {
         let mm: f64 = axis.trim().parse().ok()?;
-        let nm = (mm * 1e6).round();
+        let nm = (mm * NM_PER_MM).round();
         #[expect(clippy::cast_possible_truncation, reason = "within the range of an i32")]
         (nm.abs() <= f64::from(i32::MAX)).then_some(nm as i32)
     });
@@ -137,7 +136,7 @@ mod tests {
             for nm in [nm, -nm] {
                 let [mm, ..] = PositionNm([nm; 3]).mm();
                 #[allow(clippy::cast_possible_truncation, reason = "the job's own rounding")]
-                let again = (mm * 1e6).round() as i32;
+                let again = (mm * NM_PER_MM).round() as i32;
                 assert_eq!(again, nm);
             }
         }

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use inspect::FaultAt;
 use job::Job;
+use job::units::NM_PER_MM;
 use oracle::{AccuracyReport, PassSample, SampleCheck};
 use report::{Figure, Mark, Remarks, RidgePoint, Scallops, Sketch};
 use serde_json::{Value, json};
@@ -299,7 +300,7 @@ fn survey(judged: &Judged) -> SurveyResult {
     report.passes = judged.stretches;
     report.cc_length_mm = judged.contact_length_mm;
     report.complete = true;
-    report.position_nm.max = 1e6 * judged.path_error_mm.value.abs();
+    report.position_nm.max = NM_PER_MM * judged.path_error_mm.value.abs();
     report.ripple_pct.max = judged.feed.ripple_max_pct;
     SurveyResult {
         samples: judged.samples as u64,

@@ -9,6 +9,7 @@ use super::out::say;
 use approach::Kind;
 use inspect::FaultAt;
 use job::Job;
+use job::units::S_PER_MIN;
 use verify::speeds::SpeedRange;
 use verify::survey::SurveyResult;
 
@@ -132,7 +133,7 @@ impl Outcome<'_> {
         );
         say!(
             "  machining    {:.1} min, CC path {:.1} mm, CL path {:.1} mm",
-            self.machining_time_s() / 60.0,
+            self.machining_time_s() / S_PER_MIN,
             report.cc_length_mm,
             speeds.cl_length_mm
         );

@@ -1,5 +1,6 @@
 //! `paper`: reproduces every example, table and figure of Lo's paper.
 
+use job::units::{MM_PER_NM, S_PER_MIN};
 use std::path::PathBuf;
 
 use clap::Args;
@@ -46,7 +47,7 @@ fn compared(comparisons: &[Comparison]) -> Vec<Item> {
         for row in &comparison.rows {
             let Row { measured, .. } = row;
             let figures = [
-                ("machining time", "min", 3, measured.time_s / 60.0),
+                ("machining time", "min", 3, measured.time_s / S_PER_MIN),
                 ("segments", "", 0, measured.planned.segments as f64),
                 ("program", "bytes", 0, measured.planned.bytes as f64),
                 ("ripple at most", "%", 5, measured.findings.report.ripple_pct.max),
@@ -65,7 +66,7 @@ fn compared(comparisons: &[Comparison]) -> Vec<Item> {
                     "centre off its path",
                     "mm",
                     6,
-                    measured.findings.report.position_nm.max * 1e-6,
+                    measured.findings.report.position_nm.max * MM_PER_NM,
                 ),
             ];
             items.extend(figures.map(|(what, unit, decimals, ours)| Item {
@@ -91,7 +92,7 @@ fn spaced(tables: &[SpacingTable]) -> Vec<Item> {
                 ("passes", "", 0, row.path.passes as f64),
                 ("partial passes", "", 0, row.path.partial as f64),
                 ("length of all passes", "mm", 1, row.path.length_mm),
-                ("whole time", "min", 3, row.path.time_s / 60.0),
+                ("whole time", "min", 3, row.path.time_s / S_PER_MIN),
                 ("highest crest over the limit", "", 4, row.crest_max),
                 ("mean crest over the limit", "", 4, row.crest_mean),
                 ("error of the crests over the limit", "", 5, row.error),
@@ -167,7 +168,7 @@ fn print_comparison(comparison: &Comparison) {
         say!(
             "  {:<14} {:>9.2} {:>9} {:>10} {:>10} {:>10} {:>17} {:>17} {:>10.3}",
             row.name(),
-            measured.time_s / 60.0,
+            measured.time_s / S_PER_MIN,
             measured.planned.segments,
             measured.planned.bytes,
             page::percent(measured.findings.report.ripple_pct.max),
@@ -208,7 +209,7 @@ fn print_spacing(table: &SpacingTable) {
             row.path.partial,
             row.path.length_mm,
             table.length_ratio(row),
-            row.path.time_s / 60.0,
+            row.path.time_s / S_PER_MIN,
             table.time_ratio(row),
             row.crest_max,
             row.crest_mean,

@@ -25,6 +25,7 @@ pub(super) use connect::open_port;
 use connect::{Connected, connect, models_failure};
 use inspect::FaultAt;
 use inspect::comparison::{BoardRun, Reference};
+use job::units::S_PER_MIN;
 use job::{HeartbeatAction, Job, MachineProfile};
 use machine::prepare::{self, Prepared};
 use machine::profile;
@@ -298,7 +299,7 @@ fn print_all(arguments: &Arguments, jobs: &[PathBuf], values: &[Value], passed: 
         "{} of {} faces ran, {:.2} min, {} samples compared",
         values.iter().filter(|value| value["error"].is_null()).count(),
         jobs.len(),
-        sum("machining_time_s") / 60.0,
+        sum("machining_time_s") / S_PER_MIN,
         sum("compared_samples")
     );
 }

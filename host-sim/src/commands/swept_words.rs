@@ -5,6 +5,7 @@ use interp_core::STORE_WORDS;
 use serde_json::{Map, Value, json};
 
 use job::Job;
+use job::units::S_PER_MIN;
 use machine::prepare::Prepared;
 use verify::motion::limits::{ORDERS, Peak, Peaks};
 use verify::swept::{ConcaveRadius, SweptResult};
@@ -210,7 +211,7 @@ pub(super) fn print(
     }
     row(
         "machining time",
-        &format!("{:.2} min", job.machine.time_s(survey.samples) / 60.0),
+        &format!("{:.2} min", job.machine.time_s(survey.samples) / S_PER_MIN),
     );
     let bytes = prepared.data_bytes();
     row(

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use inspect::{BOUNDS, Requirements, RunMeasurements, TimedRun, Verification, verify_run};
 use job::Job;
+use job::units::S_PER_MIN;
 use machine::prepare::Prepared;
 use oracle::{AccuracyFigure, PassSample, SampleCheck};
 use part::{PartCheck, PassCentres};
@@ -338,7 +339,7 @@ fn summary(values: &[Value]) {
     say!(
         "{passed} of {} jobs passed, {:.2} min in all",
         values.len(),
-        sum(&|value| &value["time_s"]["whole"]) / 60.0
+        sum(&|value| &value["time_s"]["whole"]) / S_PER_MIN
     );
 }
 

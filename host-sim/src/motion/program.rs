@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use glam::DVec3;
+use job::units::S_PER_MIN;
 use job::{AxisLimits, Job};
 
 use super::{Motion, MotionError};
@@ -327,7 +328,7 @@ impl Modes {
                 return Some(None);
             }
             "SET_FEED_RATE" => {
-                self.feed_mm_s = values.first()? * self.per_unit / 60.0;
+                self.feed_mm_s = values.first()? * self.per_unit / S_PER_MIN;
                 return Some(None);
             }
             "SELECT_PLANE" => {

@@ -1,12 +1,12 @@
 //! A table of samples: CSV with the columns `t_s, x_mm, y_mm, z_mm`, or a trace of `simulate`.
 
+use job::units::MM_PER_NM;
 use std::path::Path;
 
 use glam::DVec3;
 
 use super::{Motion, MotionError};
 
-const MM_PER_NM: f64 = 1e-6;
 /// Largest deviation of a sample's time from the even spacing, as a share of the period.
 const UNEVEN: f64 = 0.01;
 

@@ -1,5 +1,6 @@
 //! Jogs: by distances, in a straight line of up to three axes, and by keys for as long as they are held.
 
+use job::units::NM_PER_MM;
 use std::sync::mpsc::RecvTimeoutError;
 
 use console::{Key, Term};
@@ -7,7 +8,7 @@ use protocol::message::{InputLines, JogWay, MotionEnd, Profile, Request};
 
 use super::super::out::to_stderr;
 use super::super::{Failure, Result};
-use super::{Distance, NM_PER_MM};
+use super::Distance;
 use machine::remote::Session;
 use machine::remote::axes;
 

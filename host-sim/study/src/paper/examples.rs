@@ -3,9 +3,9 @@
 use super::geometry::{ChordsOfPass, Geometry};
 use super::{Case, Cases, Comparison, Item};
 use approach::{ApproachError, Chords, Kind, Linear, Measured, PassPath, measure_run, passes, planned};
+use job::units::{MM_PER_NM, S_PER_MIN};
 
 /// Seconds in a minute.
-const MINUTE_S: f64 = 60.0;
 const PAPER_PERIOD_US: f64 = 5000.0;
 
 /// Builds items of one part.
@@ -137,7 +137,7 @@ fn example_1(case: &Case, u: &Geometry, v: &Geometry) -> Vec<Item> {
         "machining time",
         MINUTES,
         None,
-        u.cc_length_mm / feed / MINUTE_S,
+        u.cc_length_mm / feed / S_PER_MIN,
         "without links between passes",
     );
     part.add("passes along v", COUNT, None, v.passes as f64, "");
@@ -179,7 +179,7 @@ fn example_2(cases: &Cases) -> Result<Vec<Item>, ApproachError> {
         };
         let count = |rule| ChordsOfPass::new(pass, rule, case.job.chord_mm).map(|chords| chords.count as f64);
         let (curve, normal) = (count(Chords::Equation)?, count(Chords::EquationNormal)?);
-        let minutes = |length_mm: f64| length_mm / case.job.feed_mm_s() / MINUTE_S;
+        let minutes = |length_mm: f64| length_mm / case.job.feed_mm_s() / S_PER_MIN;
         let (cl, cc) = (minutes(geometry.cl_length_mm), minutes(geometry.cc_length_mm));
         let passes = geometry.passes as f64;
         let what = |what: &str| format!("{which}: {what}");
@@ -341,7 +341,7 @@ fn example_4(curve: Option<&Measured>) -> Vec<Item> {
             "error of the centre's path",
             MM,
             None,
-            curve.findings.report.position_nm.max * 1e-6,
+            curve.findings.report.position_nm.max * MM_PER_NM,
             "",
         );
         part.add(

@@ -1,5 +1,6 @@
 //! The tables of the page.
 
+use job::units::S_PER_MIN;
 use std::fmt::Write;
 
 use super::{percent, shown};
@@ -52,7 +53,7 @@ fn table(out: &mut String, comparison: &Comparison) {
                 ""
             },
             row.name(),
-            measured.time_s / 60.0,
+            measured.time_s / S_PER_MIN,
             shown(measured.planned.bytes as f64, 0),
             percent(measured.findings.report.ripple_pct.max),
             percent(measured.findings.report.ripple_pct.rms()),
@@ -102,7 +103,7 @@ fn spacing(out: &mut String, table: &SpacingTable) {
             row.path.partial,
             fixed(row.path.length_mm, 0),
             table.length_ratio(row),
-            row.path.time_s / 60.0,
+            row.path.time_s / S_PER_MIN,
             table.time_ratio(row),
             row.crest_max,
             row.crest_mean

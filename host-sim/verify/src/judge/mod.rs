@@ -18,6 +18,7 @@ pub use failures::SCALLOP_SLACK;
 
 use glam::DVec3;
 use job::Job;
+use job::units::NM_PER_MM;
 use oracle::Oracle;
 
 use crate::motion::{PeakMeter, Peaks};
@@ -27,7 +28,6 @@ use crate::swept::{FieldPoint, HeightField, Progress, ToolPath, height_field};
 
 use stretches::Stretches;
 
-const NM_PER_MM: f64 = 1e6;
 /// A centre farther than this from the radius, as a share of the radius, is off the surface.
 const CONTACT_SHARE: f64 = 0.1;
 /// The same, mm, for small balls.

@@ -2,13 +2,12 @@
 
 use glam::DVec3;
 use job::Job;
+use job::units::NM_PER_MM;
 use oracle::{PassSample, SampleCheck};
 
 use super::Sample;
 use crate::reach::{ContactPlace, ContactSide};
 use crate::survey::SampleObserver;
-
-const NM_PER_MM: f64 = 1e6;
 
 /// Tells of the samples in contact, each once the next one shows whether its stretch goes on.
 pub(super) struct Stretches<'a, 'b> {

@@ -17,6 +17,7 @@
 //! (168 mm/s^2 at 20 000 mm/s^3). Where even a step by the whole acceleration limit would average out, the base is too long for a verdict.
 
 use crate::Verdict;
+use job::units::MM_PER_NM;
 use job::{AXES, AxisLimits, MachineSpec};
 
 /// Names of the derivatives, and their units.
@@ -41,7 +42,6 @@ const SPEED_SHARE: f64 = 0.2;
 /// The longest base is this many times the longest judged one, at most this many periods.
 const LADDER_ABOVE: usize = 4;
 const LADDER_MAX: usize = 4096;
-const MM_PER_NM: f64 = 1e-6;
 
 /// Largest magnitude of a derivative of the positions.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -7,6 +7,7 @@
 
 use crate::EmittedSample;
 use glam::DVec3;
+use job::units::MM_PER_NM;
 
 /// Positions this near to each other, nm, on every axis, are one place: a link of up to 2 nm is left out by the machine.
 const PLACE_NM: i32 = 2;
@@ -360,8 +361,6 @@ impl TimeMeter {
         }
     }
 }
-
-const MM_PER_NM: f64 = 1e-6;
 
 fn millimetres(nm: [i32; 3]) -> DVec3 {
     DVec3::from(nm.map(f64::from)) * MM_PER_NM

@@ -1,8 +1,8 @@
 //! The way of the ball's centre over a whole run, links included, as chords in a tree of boxes.
 
 use glam::DVec3;
+use job::units::MM_PER_NM;
 
-const MM_PER_NM: f64 = 1e-6;
 /// Most samples of a chord.
 const SAMPLES_MAX: usize = 64;
 /// Samples deviate from their chord by at most this, mm.

@@ -3,10 +3,8 @@
 use super::CHORD_SHARE;
 use glam::DVec3;
 use job::Along;
+use job::units::{MM_PER_NM, NM_PER_MM};
 use oracle::PassSample;
-
-const MM_PER_NM: f64 = 1e-6;
-const NM_PER_MM: f64 = 1e6;
 
 /// A sample further than this from the line on which the stored samples arrive is stored: twice the deviation of chords that is left
 /// anyway, and not below what rounding of the centres makes of a straight line.
