@@ -1,153 +1,21 @@
 //! Exported programs, read by LinuxCNC's own interpreter (`rs274`), against the exact path of the tool centre.
 
-use std::path::PathBuf;
-use std::process::{Command, Stdio};
+mod curved;
+mod interpreter;
 
 use approach::export::{Dialect, ExportError, ExportedProgram, Options, export};
 use approach::gcode::FeedMode;
 use approach::{Kind, PassPath, job_passes, side_curves};
-use glam::DVec3;
-use job::{Job, Pattern, Spacing, Start};
-use machine::Machine;
-use machine::prepare::prepare;
+use interpreter::{Move, distance, interpret};
+use job::{Job, Pattern};
 use oracle::Oracle;
 use programs::checkout;
-
-use crate::scallop_limit::shapes::{Random, SHAPES, Shape, random_job};
 
 /// Rounding of a position: program and interpreter print four decimals each, with an error of half the last digit per axis, mm.
 const ROUNDED_MM: f64 = 1.8e-4;
 /// Number of points checked on each cut.
 const PLACES: u32 = 8;
 const CLEARANCE_MM: f64 = 3.0;
-
-/// A motion command of the interpreter.
-#[derive(Clone, Copy, Debug)]
-struct Move {
-    rapid: bool,
-    from: [f64; 3],
-    to: [f64; 3],
-    /// Two axes of the arc's plane and the one normal to it, centre in the plane, sense of rotation (1 or -1).
-    arc: Option<([usize; 3], [f64; 2], f64)>,
-    feed_mm_s: f64,
-}
-
-impl Move {
-    /// Angle of an arc, rad, and its radius, mm. The arc must be less than half a turn.
-    fn turn(&self) -> Option<(f64, f64)> {
-        let ([x, y, _], centre, sense) = self.arc?;
-        let arm = |at: [f64; 3]| [at[x] - centre[0], at[y] - centre[1]];
-        let (a, b) = (arm(self.from), arm(self.to));
-        let angle = sense * (a[0] * b[1] - a[1] * b[0]).atan2(a[0] * b[0] + a[1] * b[1]);
-        assert!(angle > 0.0, "more than half a turn: {self:?}");
-        // Maximum difference of the radii at both ends: Grbl 0.005 mm, LinuxCNC 0.0013 mm.
-        assert!((a[0].hypot(a[1]) - b[0].hypot(b[1])).abs() < 1e-3, "{self:?}");
-        Some((angle, a[0].hypot(a[1])))
-    }
-
-    fn length(&self) -> f64 {
-        let apart = |k: usize| self.to[k] - self.from[k];
-        match (self.arc, self.turn()) {
-            (Some(([.., across], ..)), Some((angle, radius))) => (angle * radius).hypot(apart(across)),
-            _ => distance(self.from, self.to),
-        }
-    }
-
-    /// Position at a fraction of the move's length.
-    fn at(&self, share: f64) -> [f64; 3] {
-        let mut place = [0, 1, 2].map(|k| self.from[k] + share * (self.to[k] - self.from[k]));
-        if let (Some(([x, y, _], centre, sense)), Some((angle, radius))) = (self.arc, self.turn()) {
-            let begin = (self.from[y] - centre[1]).atan2(self.from[x] - centre[0]);
-            let (sine, cosine) = (begin + sense * share * angle).sin_cos();
-            (place[x], place[y]) = (centre[0] + radius * cosine, centre[1] + radius * sine);
-        }
-        place
-    }
-}
-
-fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
-    (a[0] - b[0]).hypot(a[1] - b[1]).hypot(a[2] - b[2])
-}
-
-/// The interpreter that `scripts/setup.sh` unpacks, else the installed one.
-fn interpreter() -> PathBuf {
-    let unpacked = checkout().unwrap().join("target/rs274/rs274");
-    if unpacked.exists() {
-        unpacked
-    } else {
-        PathBuf::from("rs274")
-    }
-}
-
-/// The interpreter's output for a program.
-fn interpret(program: &str) -> Vec<Move> {
-    let folder = tempfile::tempdir().unwrap();
-    for (name, text) in [("program.ngc", program), ("tool.tbl", ""), ("parameters.var", "")] {
-        std::fs::write(folder.path().join(name), text).unwrap();
-    }
-    let output = Command::new(interpreter())
-        .args(["-t", "tool.tbl", "-v", "parameters.var", "-g", "program.ngc"])
-        .current_dir(folder.path())
-        // It maps a file of its tools there into memory; a second interpreter would truncate it meanwhile.
-        .env("HOME", folder.path())
-        .stdin(Stdio::null())
-        .output()
-        .expect("LinuxCNC's rs274 is needed: ./check brings it in, or install the package linuxcnc-uspace");
-    let canonical = String::from_utf8(output.stdout).unwrap();
-    let errors = String::from_utf8_lossy(&output.stderr);
-    assert!(
-        output.status.success() && canonical.contains("PROGRAM_END()"),
-        "{}: {errors}",
-        output.status
-    );
-    moves(&canonical)
-}
-
-fn moves(canonical: &str) -> Vec<Move> {
-    let mut moves = Vec::new();
-    let (mut at, mut feed_mm_s, mut plane) = ([0.0; 3], 0.0, [0, 1, 2]);
-    for line in canonical.lines() {
-        let call = line.split_whitespace().skip(2).collect::<Vec<_>>().join(" ");
-        let (name, arguments) = call.trim_end_matches(')').split_once('(').unwrap();
-        let values: Vec<f64> = arguments
-            .split(", ")
-            .filter_map(|value| value.parse().ok())
-            .collect();
-        let mut to = at;
-        let mut arc = None;
-        match name {
-            "SET_FEED_RATE" => feed_mm_s = values[0] / 60.0,
-            "SELECT_PLANE" => {
-                plane = match arguments {
-                    "CANON_PLANE_XY" => [0, 1, 2],
-                    "CANON_PLANE_XZ" => [2, 0, 1],
-                    "CANON_PLANE_YZ" => [1, 2, 0],
-                    other => panic!("plane {other}"),
-                }
-            }
-            "STRAIGHT_TRAVERSE" | "STRAIGHT_FEED" => to.copy_from_slice(&values[..3]),
-            "ARC_FEED" => {
-                for (axis, value) in plane.into_iter().zip([values[0], values[1], values[5]]) {
-                    to[axis] = value;
-                }
-                assert_eq!(values[4].abs(), 1.0, "one turn at most");
-                arc = Some((plane, [values[2], values[3]], values[4]));
-            }
-            _ => {}
-        }
-        if name.starts_with("STRAIGHT") || name == "ARC_FEED" {
-            moves.push(Move {
-                rapid: name == "STRAIGHT_TRAVERSE",
-                from: at,
-                to,
-                arc,
-                feed_mm_s,
-            });
-            at = to;
-        }
-    }
-    moves
-}
 
 /// Tolerances of an approach: distance of a cut's ends and of its inner points from the exact path, mm; deviation of
 /// the contact's speed from the feed, as a fraction of it, on average over a cut and over an eighth of a cut.
@@ -466,116 +334,6 @@ fn arcs_hold_the_tolerances_in_every_plane() {
                 // Circles of 144 degrees: two pairs of arcs at any radius.
                 assert_eq!(exported.cuts, 4 * exported.passes);
             }
-        }
-    }
-}
-
-/// The sample surfaces with passes of constant scallop height from one start.
-fn curved_jobs(start: Start) -> Vec<(String, Job)> {
-    let names = [
-        ("sphere_cap", 0.02),
-        ("freeform", 0.1),
-        ("torus", 0.02),
-        ("fan", 0.05),
-        ("revolved", 0.5),
-        ("revolved_v", 0.5),
-        ("ruled_printed", 0.5),
-        ("ruled_reconstructed", 0.5),
-        ("plate", 0.05),
-        ("plate_v", 0.05),
-    ];
-    let curved = |(name, scallop_mm): (&str, f64)| {
-        let mut job = job(name, scallop_mm);
-        (job.spacing, job.pattern) = (Spacing::Constant(start), Pattern::Zigzag);
-        (format!("{name} {start:?}"), job)
-    };
-    names.map(curved).to_vec()
-}
-
-/// Lines and arcs of curved passes, partial ones among them, hold the same tolerances.
-#[test]
-fn curved_passes_hold_the_tolerances() {
-    // Lines of each job from its edge, arcs from its middle, and the other way about for every second job.
-    let jobs = curved_jobs(Start::Edge)
-        .into_iter()
-        .zip(curved_jobs(Start::Middle));
-    for (index, ((name, edge), (_, middle))) in jobs.enumerate() {
-        println!("{name}");
-        let [one, other] = if index % 2 == 0 {
-            [&edge, &middle]
-        } else {
-            [&middle, &edge]
-        };
-        let line = options(Dialect::Grbl, Kind::Linear, FeedMode::G93);
-        check(one, &line, &of_linear(one));
-        let arcs = options(Dialect::Linuxcnc, Kind::Curve, FeedMode::G94);
-        check(other, &arcs, &of_curve(other));
-    }
-}
-
-/// The same of random difficult surfaces, those that the core machines and that face up.
-#[test]
-fn curved_passes_of_random_surfaces_hold_the_tolerances() {
-    let mut checked = 0;
-    for seed in 0..number("ISOFEED_CASES", 28) {
-        let shape = SHAPES[seed as usize % SHAPES.len()];
-        let mut job = random_job(shape, &mut Random(seed.wrapping_mul(0x1234_5678_9abc_def1)));
-        job.machine.limits = None;
-        let start = [Start::Edge, Start::Middle][seed as usize / SHAPES.len() % 2];
-        (job.spacing, job.chord_mm) = (Spacing::Constant(start), 0.005);
-        let runs = prepare(&job)
-            .is_ok_and(|prepared| Machine::load(&prepared).is_ok_and(|mut core| core.run(|_| true).is_ok()));
-        let line = options(Dialect::Linuxcnc, Kind::Linear, FeedMode::G94);
-        if !runs || matches!(export(&job, &line, &|| ()), Err(ExportError::FacesDown { .. })) {
-            continue;
-        }
-        println!("{checked} checked: {shape:?} {seed} {start:?}");
-        check(&job, &line, &only_mean(&job));
-        let arcs = options(Dialect::Linuxcnc, Kind::Curve, FeedMode::G94);
-        // Where the curvature jumps, the centre's path has a corner: arcs are refused, on straight passes too.
-        if shape != Shape::Jumps {
-            check(&job, &arcs, &of_curve(&job));
-        }
-        checked += 1;
-    }
-    println!("{checked} surfaces");
-    assert!(checked >= 8, "{checked} surfaces");
-}
-
-fn number(name: &str, usual: u64) -> u64 {
-    std::env::var(name).map_or(usual, |cases| cases.parse().unwrap())
-}
-
-/// The exported curves are the core's: its samples at the job's own feed, which is higher than that of the curves' points, are on them.
-#[test]
-fn curves_are_those_of_the_core() {
-    /// Rounding of an emitted contact, and of the curve's parameters, nm.
-    const OFF_NM: f64 = 10.0;
-    for start in [Start::Edge, Start::Middle] {
-        for (name, mut job) in curved_jobs(start) {
-            (job.machine.limits, job.feed_mm_min) = (None, 4321.0);
-            let oracle = Oracle::new(&job).unwrap();
-            let curves = side_curves(&job).unwrap();
-            let passes = job_passes(&oracle, &curves).unwrap();
-            let prepared = prepare(&job).unwrap();
-            let mut off_nm = 0.0_f64;
-            let mut last = 0;
-            Machine::load(&prepared)
-                .unwrap()
-                .run(|sample| {
-                    let Some([u, v]) = inspect::plain(&prepared, sample).parameters else {
-                        return true;
-                    };
-                    let at = passes[sample.pass as usize].at(oracle.swapped(u, v).0).unwrap();
-                    let emitted = DVec3::from(sample.cl_nm.map(f64::from));
-                    off_nm = off_nm.max(emitted.distance(at.contact.cl_mm * 1e6));
-                    last = sample.pass as usize;
-                    true
-                })
-                .unwrap();
-            println!("{name}: {off_nm:.1} nm");
-            assert!(off_nm <= OFF_NM, "{name}: {off_nm} nm");
-            assert_eq!(last + 1, passes.len(), "{name}");
         }
     }
 }

@@ -1,11 +1,15 @@
 //! Spindle and coolant: on from the start of a run to its end, at speed before the first motion, off whenever the run ends or the host is gone.
 
-use controller::{in_process::Board, spindle::output};
+mod by_command;
+mod contact;
+
+use controller::in_process::Board;
+use controller::spindle::output;
 use integration_tests::{HELLO, Host, dome, upload};
-use interp_core::{AxisLimits, FaultKind, RunStart, SpanParameter, State};
+use interp_core::{AxisLimits, RunStart, SpanParameter, State};
 use protocol::message::{
     Activity, AtSpeed, Configuration, DoorContact, InputLines, LinkTimeoutAction, MotionStatus, PWM_STEPS,
-    PauseCause, Reason, Reply, Request, SpindleOrder, SpindleSettings, Status, Turning,
+    Reason, Reply, Request, SpindleOrder, SpindleSettings, Status, Turning,
 };
 
 const AT_SPEED: u32 = 300;
@@ -308,63 +312,6 @@ fn with_contact() -> Desk {
     desk
 }
 
-#[test]
-fn a_start_waits_for_the_spindles_contact() {
-    let mut desk = with_contact();
-    desk.ask(&Request::Start).unwrap();
-    // A report that comes at once is that of another speed.
-    desk.board.simulate(InputLines::AT_SPEED);
-    desk.ticks(50);
-    assert_eq!((desk.status().state, desk.outputs()), (State::Ready, ON));
-    desk.board.simulate(InputLines::NONE);
-    desk.ticks(150);
-    assert_eq!(
-        (desk.status().state, desk.motion().activity),
-        (State::Ready, Activity::SpinUp)
-    );
-    desk.board.simulate(InputLines::AT_SPEED);
-    desk.ticks(5);
-    assert_eq!(desk.status().state, State::Linking);
-}
-
-/// A contact that is silent: a fault with a name, before anything moves, and of a resume where the pause has left the tool.
-#[test]
-fn a_spindle_that_does_not_report_its_speed_is_a_fault() {
-    let is_fault = |status: &Status| {
-        let kind = status.fault.and_then(|fault| fault.kind());
-        status.state == State::Faulted && kind == Some(FaultKind::SpindleSpeed)
-    };
-    let mut desk = with_contact();
-    desk.ask(&Request::Start).unwrap();
-    desk.ticks(AT_SPEED - 10);
-    assert_eq!(desk.status().state, State::Ready);
-    desk.ticks(20);
-    let status = desk.status();
-    assert!(
-        is_fault(&status) && status.samples == 0 && desk.halts == 1,
-        "{status:?}"
-    );
-    assert_eq!(desk.outputs(), output::DRIVES);
-    assert!(matches!(
-        desk.ask(&Request::Start),
-        Err(Reason::WrongState { .. })
-    ));
-    desk.ask(&Request::Abort).unwrap();
-    desk.ticks(2);
-    // With its report the same start succeeds.
-    let mut desk = desk.turning();
-    desk.ask(&Request::Pause).unwrap();
-    desk.ticks(3000);
-    assert_eq!(
-        (desk.status().state, desk.outputs()),
-        (State::Held, output::DRIVES)
-    );
-    desk.board.simulate(InputLines::NONE);
-    desk.ask(&Request::Resume).unwrap();
-    desk.ticks(AT_SPEED + 10);
-    assert!(is_fault(&desk.status()) && desk.halts == 2);
-}
-
 impl Desk {
     /// Starts, with a spindle that reports its speed, and runs until a pass is under way.
     fn turning(mut self) -> Self {
@@ -382,92 +329,10 @@ impl Desk {
     }
 }
 
-/// Below its speed for 0.1 s in the cut: the tool leaves the surface, the spindle is off, and resume waits for its speed. A shorter dip does nothing.
-#[test]
-fn a_spindle_that_falls_below_its_speed_pauses_the_run() {
-    let mut desk = with_contact().turning();
-    desk.board.simulate(InputLines::NONE);
-    desk.ticks(90);
-    desk.board.simulate(InputLines::AT_SPEED);
-    desk.ticks(90);
-    assert_eq!((desk.status().state, desk.outputs()), (State::Running, ON));
-    desk.board.simulate(InputLines::NONE);
-    desk.ticks(110);
-    assert_ne!(desk.status().state, State::Running);
-    desk.ticks(3000);
-    let status = desk.status();
-    assert_eq!(
-        (status.state, status.safety.pause),
-        (State::Held, PauseCause::BelowSpeed)
-    );
-    assert_eq!(desk.outputs(), output::DRIVES);
-    // It has left the surface: the dome's top is below.
-    assert!(desk.motion_z() >= 40_000_000);
-    desk.ask(&Request::Resume).unwrap();
-    desk.ticks(150);
-    desk.board.simulate(InputLines::AT_SPEED);
-    desk.until_over();
-    assert_eq!(desk.status().safety.pause, PauseCause::None);
-}
-
 impl Desk {
     fn motion_z(&mut self) -> i32 {
         self.board.real_time().last().cl_nm[2]
     }
-}
-
-/// The door: the run pauses above the surface with the spindle off; nothing resumes or starts it while it is open; then it goes on to the same sample.
-#[test]
-fn an_open_door_pauses_the_run_and_lets_nothing_resume_it() {
-    let whole = {
-        let mut desk = with_contact().turning();
-        desk.until_over()
-    };
-    let mut desk = with_contact().turning();
-    desk.board.simulate(InputLines::AT_SPEED.or(InputLines::DOOR));
-    desk.ticks(3000);
-    let status = desk.status();
-    assert_eq!(
-        (status.state, status.safety.pause),
-        (State::Held, PauseCause::Door)
-    );
-    assert_eq!(desk.outputs(), output::DRIVES);
-    assert!(desk.motion_z() >= 40_000_000);
-    let is_refused = |came: Result<(), Reason>| match came {
-        Err(Reason::Unsafe { fault }) => fault.kind() == Some(FaultKind::DoorOpen),
-        _ => false,
-    };
-    let refused = desk.ask(&Request::Resume);
-    assert!(is_refused(refused));
-    // Opened again while the spindle comes up to speed.
-    desk.board.simulate(InputLines::NONE);
-    desk.ticks(5);
-    desk.ask(&Request::Resume).unwrap();
-    desk.ticks(20);
-    assert_eq!(desk.outputs(), ON);
-    desk.board.simulate(InputLines::DOOR);
-    desk.ticks(20);
-    assert_eq!(
-        (desk.status().state, desk.outputs()),
-        (State::Held, output::DRIVES)
-    );
-    desk.ticks(1000);
-    assert_eq!(desk.status().state, State::Held);
-    desk.board.simulate(InputLines::AT_SPEED);
-    desk.ticks(5);
-    desk.ask(&Request::Resume).unwrap();
-    let paused = desk.until_over();
-    assert_eq!(paused, whole, "the places of the run on the surface");
-    // Neither does a run start.
-    desk.board.simulate(InputLines::DOOR);
-    desk.ticks(5);
-    let refused = desk.ask(&Request::Start);
-    assert!(is_refused(refused));
-    let refused = desk.ask(&Request::Turn {
-        turning: Turning::Clockwise,
-        rpm: 1,
-    });
-    assert!(is_refused(refused));
 }
 
 impl Desk {
@@ -487,103 +352,6 @@ impl Desk {
         }
         panic!("{:?}", self.status());
     }
-}
-
-/// By command outside a run: on with the drives alone, off without a host, with the drives, an open door, a load; and never in a run.
-#[test]
-fn a_spindle_by_command_is_on_for_as_long_as_the_host_is_heard() {
-    let turn = Request::Turn {
-        turning: Turning::Clockwise,
-        rpm: 6_000,
-    };
-    let on = output::DRIVES | output::SPINDLE | (PWM_STEPS / 4) << output::DUTY_SHIFT;
-    let mut desk = with_contact();
-    desk.ask(&turn).unwrap();
-    assert_eq!(desk.outputs(), on);
-    for _ in 0..5 {
-        desk.ticks(900);
-        desk.answer(&Request::Status);
-        assert_eq!(desk.outputs(), on);
-    }
-    desk.ask(&Request::Coolant { on: true }).unwrap();
-    assert_eq!(desk.outputs(), on | output::COOLANT);
-    let probe = Request::Probe {
-        axis: 2,
-        nm: -1000,
-        speed_mm_s: 1.0,
-    };
-    assert_eq!(desk.ask(&probe), Err(Reason::SpindleTurns));
-    desk.ticks(990);
-    assert_eq!(desk.outputs(), on | output::COOLANT);
-    desk.ticks(20);
-    assert_eq!(
-        desk.outputs(),
-        output::DRIVES,
-        "the host was not heard for a second"
-    );
-    for (lines, outputs) in [
-        (InputLines::DOOR, output::DRIVES),
-        (InputLines::EMERGENCY_STOP, 0),
-    ] {
-        let mut desk = with_contact();
-        desk.ask(&turn).unwrap();
-        desk.board.simulate(lines);
-        desk.ticks(5);
-        assert_eq!(desk.outputs(), outputs, "{lines:?}");
-    }
-    desk.ask(&turn).unwrap();
-    desk.ask(&Request::Drives { on: false }).unwrap();
-    assert_eq!(desk.outputs(), 0);
-    assert_eq!(desk.ask(&turn), Err(Reason::DrivesOff));
-    let fast = Request::Turn {
-        turning: Turning::Clockwise,
-        rpm: MAX_RPM + 1,
-    };
-    desk.ask(&Request::Drives { on: true }).unwrap();
-    assert!(matches!(desk.ask(&fast), Err(Reason::OutOfRange { .. })));
-    // In a run the spindle is the job's; the coolant is the operator's.
-    let mut desk = with_contact().turning();
-    assert!(matches!(desk.ask(&turn), Err(Reason::WrongState { .. })));
-    desk.ask(&Request::Coolant { on: false }).unwrap();
-    assert_eq!(desk.outputs(), ON & !output::COOLANT);
-    desk.ask(&Request::Pause).unwrap();
-    desk.ticks(3000);
-    desk.ask(&Request::Resume).unwrap();
-    assert_eq!(desk.outputs(), ON & !output::COOLANT, "for the rest of the run");
-    desk.ticks(AT_SPEED);
-    desk.ask(&Request::Abort).unwrap();
-    desk.ticks(3000);
-    assert_eq!(
-        (desk.status().state, desk.outputs()),
-        (State::Ready, output::DRIVES)
-    );
-    desk.ask(&Request::SetHome {
-        home_nm: [0, 0, 50_000_000],
-    })
-    .unwrap();
-    desk.ask(&Request::Start).unwrap();
-    assert_eq!(desk.outputs(), ON, "the next run has the job's");
-}
-
-/// Switched off while a start waits, the coolant stays off in that run, and the run keeps its spindle although the host is gone.
-#[test]
-fn a_coolant_switched_while_a_start_waits_is_that_of_its_run() {
-    let mut desk = Desk::ready();
-    desk.ask(&Request::Start).unwrap();
-    desk.ticks(10);
-    desk.ask(&Request::Coolant { on: false }).unwrap();
-    desk.ticks(AT_SPEED + 2000);
-    assert!(desk.status().state.is_under_way());
-    assert_eq!(desk.outputs(), ON & !output::COOLANT);
-    desk.ask(&Request::Abort).unwrap();
-    desk.ticks(3000);
-    desk.ask(&Request::Start).unwrap();
-    assert_eq!(desk.outputs(), ON);
-    desk.ask(&Request::Coolant { on: false }).unwrap();
-    desk.ask(&Request::Stop).unwrap();
-    desk.ticks(2);
-    desk.ask(&Request::Start).unwrap();
-    assert_eq!(desk.outputs(), ON, "the start that was taken back is over");
 }
 
 /// A start that waits for its spindle is over when an input forbids it: told to the host, with the spindle off.
