@@ -111,6 +111,20 @@ pub fn parse_with(name: &str, text: &str, faces: &dyn FaceReader) -> Result<Job,
     parse_on(name, text, faces, None)
 }
 
+/// The sections of a job.
+const SECTIONS: [&str; 10] = [
+    "surface",
+    "placement",
+    "region",
+    "tool",
+    "stock",
+    "fixture",
+    "part",
+    "cut",
+    "machine",
+    "spindle",
+];
+
 fn parse_on(
     name: &str,
     text: &str,
@@ -119,21 +133,7 @@ fn parse_on(
 ) -> Result<Job, JobError> {
     let reader = Reader::new(name, text);
     let document = reader.document()?;
-    document.only(
-        &[
-            "surface",
-            "placement",
-            "region",
-            "tool",
-            "stock",
-            "fixture",
-            "part",
-            "cut",
-            "machine",
-            "spindle",
-        ],
-        &[],
-    )?;
+    document.only(&SECTIONS, &[])?;
     let part = match document.optional_section("part")? {
         Some(section) => Some(file::part(&section)?),
         None => None,
@@ -191,13 +191,7 @@ fn parse_on(
         spacing,
         chord_mm,
         overrun_mm,
-        machine: MachineSpec {
-            spindle: document
-                .optional_section("spindle")?
-                .map(|spindle| spindle::read(&spindle, profile))
-                .transpose()?,
-            ..machine::read_on(document.optional_section("machine")?.as_ref(), profile)?
-        },
+        machine: machine_and_spindle(&document, profile)?,
         origin,
     };
     cut::check_feed(&cut, &job)?;
@@ -205,6 +199,20 @@ fn parse_on(
         own_region(&document, &mut job, faces)?;
     }
     Ok(job)
+}
+
+/// The sections of the machine and its spindle.
+fn machine_and_spindle(
+    document: &Section<'_>,
+    profile: Option<&MachineProfile>,
+) -> Result<MachineSpec, JobError> {
+    Ok(MachineSpec {
+        spindle: document
+            .optional_section("spindle")?
+            .map(|spindle| spindle::read(&spindle, profile))
+            .transpose()?,
+        ..machine::read_on(document.optional_section("machine")?.as_ref(), profile)?
+    })
 }
 
 /// The surface of a job, where its file places it.
