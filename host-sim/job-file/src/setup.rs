@@ -209,109 +209,99 @@ mod tests {
         );
     }
 
-    /// Each with its line, what is wrong, and a remedy.
+    /// Checks the line of an error, what is wrong, and that there is a remedy.
+    fn is_refused(tool: &str, rest: &str, line: &str, what: &str) {
+        let error = with(tool, rest).unwrap_err();
+        let (at, _) = error.line_and_column().unwrap();
+        let text = TORUS.replace("[tool]", &format!("[tool]\n{tool}")) + "\n" + rest;
+        let shown = text.lines().nth(at - 1).unwrap();
+        assert!(error.what().contains(what), "{tool}{rest}: {error}");
+        assert!(shown.contains(line), "{tool}{rest}: line {at} {shown}");
+        assert!(!error.remedy().is_empty());
+    }
+
     #[test]
-    fn wrong_values_are_refused_at_their_line() {
-        let fixture = |text: &str| format!("[[fixture]]\n{text}\n");
-        for (tool, rest, line, what) in [
-            ("shank_mm = 0", "", "shank_mm", "`shank_mm` must be above 0"),
-            ("shank_mm = \"6\"", "", "shank_mm", "must be a number"),
-            ("shank = 6", "", "shank = 6", "did you mean `shank_mm`?"),
-            (
-                "neck_mm = 4.9",
-                "",
-                "neck_mm",
-                "at least the ball's radius of 5 mm",
-            ),
+    fn wrong_tools_are_refused_at_their_line() {
+        for (tool, line, what) in [
+            ("shank_mm = 0", "shank_mm", "`shank_mm` must be above 0"),
+            ("shank_mm = \"6\"", "shank_mm", "must be a number"),
+            ("shank = 6", "shank = 6", "did you mean `shank_mm`?"),
+            ("neck_mm = 4.9", "neck_mm", "at least the ball's radius of 5 mm"),
             (
                 "length_mm = 5",
-                "",
                 "length_mm",
                 "above the ball's radius of 5 mm, not 5",
             ),
             (
                 "neck_mm = 9\nlength_mm = 9",
-                "",
                 "length_mm",
                 "above the neck of 9 mm",
             ),
             (
                 "holder = { diameter_mm = 40, length_mm = 60 }",
-                "",
                 "holder",
                 "`holder` needs `length_mm`",
             ),
-            (
-                "holder = []\nlength_mm = 30",
-                "",
-                "holder",
-                "1 to 100 parts, not 0",
-            ),
+            ("holder = []\nlength_mm = 30", "holder", "1 to 100 parts, not 0"),
             (
                 "holder = 40\nlength_mm = 30",
-                "",
                 "holder",
                 "must be a table, not a number",
             ),
             (
                 "length_mm = 30\nholder = { diameter_mm = [40, -1], length_mm = 60 }",
-                "",
                 "holder",
                 "must be above 0 and at most 2000, not -1",
             ),
             (
                 "length_mm = 30\nholder = { diameter_mm = 40 }",
-                "",
                 "holder",
                 "`length_mm` is missing",
             ),
             (
                 "length_mm = 30\nholder = [{ diameter = 40, length_mm = 60 }]",
-                "",
                 "holder",
                 "unknown key `diameter`",
             ),
-            ("", "[stock]\n", "[stock]", "`box_mm` is missing"),
+        ] {
+            is_refused(tool, "", line, what);
+        }
+    }
+
+    #[test]
+    fn wrong_stock_and_fixtures_are_refused_at_their_line() {
+        let fixture = |text: &str| format!("[[fixture]]\n{text}\n");
+        for (rest, line, what) in [
+            ("[stock]\n", "[stock]", "`box_mm` is missing"),
             (
-                "",
                 "[stock]\nbox_mm = [[0, 1], [1, 1], [0, 1]]\n",
                 "box_mm",
                 "the range of y in `box_mm` must ascend",
             ),
             (
-                "",
                 "[[stock]]\nbox_mm = [[0, 1], [0, 1], [0, 1]]\n",
                 "stock",
                 "must be a section",
             ),
             (
-                "",
                 "[fixture]\nbox_mm = [[0, 1], [0, 1], [0, 1]]\n",
                 "fixture",
                 "a list of sections",
             ),
             (
-                "",
                 &fixture("box_mm = [[0, 1], [0, 1]]"),
                 "box_mm",
                 "must have 3 rows, not 2",
             ),
             (
-                "",
                 &fixture("box_mm = [[0, 1], [0, 1], [0, 1e6]]"),
                 "box_mm",
                 "within 20000 mm",
             ),
-            ("", &fixture("colour = 1"), "colour", "unknown key `colour`"),
-            ("", &fixture(""), "[[fixture]]", "`box_mm` is missing"),
+            (&fixture("colour = 1"), "colour", "unknown key `colour`"),
+            (&fixture(""), "[[fixture]]", "`box_mm` is missing"),
         ] {
-            let error = with(tool, rest).unwrap_err();
-            let (at, _) = error.line_and_column().unwrap();
-            let text = TORUS.replace("[tool]", &format!("[tool]\n{tool}")) + "\n" + rest;
-            let shown = text.lines().nth(at - 1).unwrap();
-            assert!(error.what().contains(what), "{tool}{rest}: {error}");
-            assert!(shown.contains(line), "{tool}{rest}: line {at} {shown}");
-            assert!(!error.remedy().is_empty());
+            is_refused("", rest, line, what);
         }
     }
 }

@@ -4,14 +4,30 @@ use serde_json::Value;
 
 use super::{err, folder_with, json, out, run};
 
-/// Every kind of invalid input ends with code 2, an error and a remedy.
-#[test]
-fn nonsense_gets_a_remedy() {
+/// Checks that each of these arguments ends with code 2, and an error that has these parts.
+fn gets_a_remedy(cases: &[(&str, &[&str])]) {
     let folder = folder_with("torus", &[("scallop_mm", "scalop_mm")]);
     std::fs::write(folder.path().join("empty.toml"), "").unwrap();
     std::fs::write(folder.path().join("part.step"), "ISO-10303-21;\n").unwrap();
-    for (arguments, says) in [
-        ("simulate", &["<JOB>", "--help"][..]),
+    for (arguments, says) in cases {
+        let output = run(folder.path(), arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments}: {}", err(&output));
+        assert!(output.stdout.is_empty(), "{arguments}");
+        for part in *says {
+            assert!(
+                err(&output).contains(part),
+                "{arguments}: {part} is not in {}",
+                err(&output)
+            );
+        }
+    }
+}
+
+/// Commands, options and files that there are not.
+#[test]
+fn unknown_words_and_files_get_a_remedy() {
+    gets_a_remedy(&[
+        ("simulate", &["<JOB>", "--help"]),
         ("simulat job.toml", &["simulate"]),
         ("simulate job.toml --trase x", &["--trace"]),
         (
@@ -25,6 +41,18 @@ fn nonsense_gets_a_remedy() {
             "simulate job.toml",
             &["did you mean `scallop_mm`?", "job.toml:43:1", "help:"],
         ),
+        ("export job.toml --format heidenhain -o x", &["linuxcnc, grbl"]),
+        ("explain ball-dos-not-fit", &["ball-does-not-fit"]),
+        ("new -o .", &["that is a folder: give a file in it"]),
+        ("new -o no/job.toml", &["create the folder first"]),
+        ("completions tcsh", &["bash, zsh, fish"]),
+    ]);
+}
+
+/// Numbers out of their range.
+#[test]
+fn numbers_out_of_range_get_a_remedy() {
+    gets_a_remedy(&[
         (
             "export job.toml --format linuxcnc --clearance -3 -o x",
             &["'-3' for '--clearance <MM>'", "a length in mm above 0"],
@@ -85,12 +113,14 @@ fn nonsense_gets_a_remedy() {
             "operate --port nowhere spindle 9000 --for 1e20",
             &["'1e20' for '--for <SECONDS>'", "at most 86400"],
         ),
-        ("export job.toml --format heidenhain -o x", &["linuxcnc, grbl"]),
         ("budget --ticks 0", &["0 is not in 1.."]),
-        ("explain ball-dos-not-fit", &["ball-does-not-fit"]),
-        ("new -o .", &["that is a folder: give a file in it"]),
-        ("new -o no/job.toml", &["create the folder first"]),
-        ("completions tcsh", &["bash, zsh, fish"]),
+    ]);
+}
+
+/// Boards and images that there are not, or that do not fit together.
+#[test]
+fn unknown_boards_and_images_get_a_remedy() {
+    gets_a_remedy(&[
         ("run job.toml", &["--qemu|--chip <BOARD>|--port"]),
         ("flash --board arduino", &["stm32f405, skr-pro"]),
         (
@@ -116,18 +146,13 @@ fn nonsense_gets_a_remedy() {
             &["part.step: it is no ELF file", "help:"],
         ),
         ("log --from nope.bin", &["--image"]),
-    ] {
-        let output = run(folder.path(), arguments);
-        assert_eq!(output.status.code(), Some(2), "{arguments}: {}", err(&output));
-        assert!(output.stdout.is_empty(), "{arguments}");
-        for part in says {
-            assert!(
-                err(&output).contains(part),
-                "{arguments}: {part} is not in {}",
-                err(&output)
-            );
-        }
-    }
+    ]);
+}
+
+/// The approaches that export can use are those in its help.
+#[test]
+fn the_help_of_export_names_its_approaches() {
+    let folder = folder_with("torus", &[]);
     let help = out(&run(folder.path(), "export --help"));
     assert!(
         help.contains("- curve:") && !help.contains("- surface:"),
