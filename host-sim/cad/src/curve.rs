@@ -82,10 +82,7 @@ impl Curve {
                 x: by.vector(*x),
                 y: by.vector(*y),
             },
-            Self::Spline(spline) => Self::Spline(SplineCurve {
-                axis: spline.axis.clone(),
-                poles: spline.poles.iter().map(|pole| by.pole(*pole)).collect(),
-            }),
+            Self::Spline(spline) => Self::Spline(spline.placed(by)),
         }
     }
 

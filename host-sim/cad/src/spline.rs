@@ -1,6 +1,7 @@
 //! B-splines of any degree, rational or not: evaluation, and exact restriction to a part of the domain
 //! (Piegl and Tiller, "The NURBS Book", 2nd ed., A2.1 to A2.3, A4.4, A5.1; here "P&T").
 
+use super::placement::Placement;
 use glam::DVec3;
 use oracle::Derivatives;
 use serde::{Deserialize, Serialize};
@@ -193,6 +194,15 @@ pub struct SplineCurve {
 }
 
 impl SplineCurve {
+    /// The curve, transformed by a placement.
+    #[must_use]
+    pub fn placed(&self, by: &Placement) -> Self {
+        Self {
+            axis: self.axis.clone(),
+            poles: self.poles.iter().map(|pole| by.pole(*pole)).collect(),
+        }
+    }
+
     /// Point, first and second derivative, mm.
     #[must_use]
     pub fn at(&self, t: f64) -> [DVec3; 3] {
@@ -309,6 +319,16 @@ pub struct SplineSurface {
 }
 
 impl SplineSurface {
+    /// The surface, transformed by a placement.
+    #[must_use]
+    pub fn placed(&self, by: &Placement) -> Self {
+        let row = |row: &Vec<Pole>| row.iter().map(|pole| by.pole(*pole)).collect();
+        Self {
+            axes: self.axes.clone(),
+            poles: self.poles.iter().map(row).collect(),
+        }
+    }
+
     /// Ranges of u and v.
     #[must_use]
     pub fn domain(&self) -> [[f64; 2]; 2] {

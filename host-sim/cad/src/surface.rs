@@ -210,24 +210,11 @@ impl Surface {
                 range: *range,
                 direction: d(direction),
             },
-            Self::Ruled { first, second } => {
-                let placed = |curve: &SplineCurve| SplineCurve {
-                    axis: curve.axis.clone(),
-                    poles: curve.poles.iter().map(|pole| by.pole(*pole)).collect(),
-                };
-                Self::Ruled {
-                    first: placed(first),
-                    second: placed(second),
-                }
-            }
-            Self::Spline(spline) => Self::Spline(SplineSurface {
-                axes: spline.axes.clone(),
-                poles: spline
-                    .poles
-                    .iter()
-                    .map(|row| row.iter().map(|pole| by.pole(*pole)).collect())
-                    .collect(),
-            }),
+            Self::Ruled { first, second } => Self::Ruled {
+                first: first.placed(by),
+                second: second.placed(by),
+            },
+            Self::Spline(spline) => Self::Spline(spline.placed(by)),
             Self::Offset { base, distance } => {
                 let turn = if by.mirrors() { -1.0 } else { 1.0 };
                 Self::Offset {
