@@ -1,4 +1,4 @@
-//! The passes of a face along each parameter, about: how long they take, and what they leave where the region ends.
+//! An estimate of the passes of a face along each parameter: their time, and the share of the face that they leave where the region ends.
 //!
 //! Where nothing is in the way a region is larger than its face, so passes may end anywhere. Where something is, they end on its boundary: one that is slanted to them keeps
 //! a strip that is higher than the limit, between the ends of passes. Across the boundary nothing is left, so the direction decides.
@@ -7,12 +7,12 @@ use job::{Along, Region};
 use machine::PASS_S;
 use part::LEFTOVER_SHARE;
 
-/// Most lines that are looked at, and parts of an interval.
+/// Greatest number of lines of an estimate, and parts of an interval.
 const LINES_MAX: usize = 4000;
 const PARTS: u32 = 8;
 /// Shortest interval, in step-overs, as in jobs.
 const LEAST_STEPS: f64 = 0.1;
-/// What is left may be as many times the scallop limit, as `verify` counts it.
+/// Greatest height of a place that is finished, in scallop limits, as `verify` counts it.
 const HIGHER: f64 = 1.0 + LEFTOVER_SHARE;
 /// Lines on either side of a place that may serve it.
 const BESIDE: usize = 3;

@@ -9,9 +9,9 @@ use part::{Inside, State};
 
 use crate::estimate::{PassEstimate, PassEstimator};
 use crate::planner::{FaceSurface, JobFolder, Planner};
-use crate::setup::{LOOK_SIDE, Setup};
+use crate::setup::{LOOK_SIDE, PartSetup};
 
-/// Places a side at which the reach of a face is measured.
+/// Places along each parameter at which the reach of a face is measured.
 pub(crate) const REACH_SIDE: usize = 64;
 
 /// Cells a side of the picture of a face as large as the part, and the least and the most of a face: of a part of few faces, and of many.
@@ -60,7 +60,7 @@ pub struct FacePlan {
     pub job: Option<FaceJob>,
     /// Why it has no job, where that is not its reach.
     pub refused: Option<FaceRefused>,
-    /// Side of the tool, as in job files.
+    /// UpSide of the tool, as in job files.
     pub side: &'static str,
     /// Parameters of the surface.
     pub parameters: FaceParameters,
@@ -99,7 +99,7 @@ impl FacePlan {
     }
 
     /// Makes the cells of the picture: smaller ones on larger faces.
-    pub(crate) fn draw(&mut self, setup: &Setup, face: &Face) {
+    pub(crate) fn draw(&mut self, setup: &PartSetup, face: &Face) {
         let Some(surface) = self.surface.as_ref().filter(|_| face.surface.kind() != "plane") else {
             return;
         };
@@ -125,7 +125,7 @@ impl Planner<'_> {
     /// The plan of a face with a surface.
     pub(crate) fn plan_with(
         &self,
-        setup: &Setup,
+        setup: &PartSetup,
         folder: &JobFolder,
         face: &Face,
         surface: &FaceSurface,
@@ -174,7 +174,7 @@ impl Planner<'_> {
     /// The job of a face and its text, with passes along u unless the direction is given.
     fn read_back(
         &self,
-        setup: &Setup,
+        setup: &PartSetup,
         folder: &JobFolder,
         face: &Face,
         surface: &MachinableFace,
@@ -204,7 +204,7 @@ impl Planner<'_> {
     /// Region, direction, time and text of a job; `None` if it has no region.
     fn face_job(
         &self,
-        setup: &Setup,
+        setup: &PartSetup,
         face: &Face,
         machinable: &MachinableFace,
         job: Job,

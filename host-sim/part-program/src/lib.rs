@@ -1,7 +1,7 @@
 //! The program of a part: a job for each face that the tool reaches, their order, and the links between passes and between faces.
 //!
 //! ```text
-//! faces of a file ──setup.rs──► Setup: side up, translation, the part on the machine
+//! faces of a file ──setup.rs──► PartSetup: side up, translation, the part on the machine
 //!                      │ face.rs      region of a face, its job, the direction of its passes (estimate.rs)
 //!                      ▼
 //! FacePlan of each face ──order.rs──► order of the faces by the time of their links ──text.rs──► one job file of all faces
@@ -27,6 +27,6 @@ pub use face::{FaceJob, FacePlan, FaceRefused};
 pub use links::add_links;
 pub use order::FaceOrder;
 pub use planner::{CutOptions, JobFolder, Planner};
-pub use setup::{Setup, Side};
+pub use setup::{PartSetup, UpSide};
 pub use stops::{Stop, stops};
 pub use sums::{Sums, percent};

@@ -10,11 +10,11 @@ use rayon::prelude::*;
 
 use crate::face::{FacePlan, REACH_SIDE};
 use crate::order::{FaceLinks, FaceOrder};
-use crate::setup::{Setup, Side};
+use crate::setup::{PartSetup, UpSide};
 
 /// How far the surface of a face goes on beyond it, in step-overs: as for a job.
 const STEP_OVERS_AROUND: f64 = job_file::STEP_OVERS_AROUND;
-/// Places a side of a face at which the sides of a part are compared.
+/// Places along each parameter of a face by which the six sides of a part are compared.
 const SIDE_LOOKS: usize = 16;
 
 /// Tool and cut of all faces.
@@ -103,14 +103,14 @@ impl<'a> Planner<'a> {
 
     /// The part with this side up.
     #[must_use]
-    pub fn setup(&self, side: Side) -> Setup {
-        Setup::new(side, self.model, self.cut.tool(), self.cut.scallop_mm())
+    pub fn setup(&self, side: UpSide) -> PartSetup {
+        PartSetup::new(side, self.model, self.cut.tool(), self.cut.scallop_mm())
     }
 
     /// The part with the side up of which the tool reaches most; of equal ones the first.
     #[must_use]
-    pub fn best_setup(&self) -> Setup {
-        let tried = Side::ALL.map(|side| {
+    pub fn best_setup(&self) -> PartSetup {
+        let tried = UpSide::ALL.map(|side| {
             let setup = self.setup(side);
             let known = self
                 .faces
@@ -122,7 +122,7 @@ impl<'a> Planner<'a> {
             (reached, side)
         });
         let best = tried.into_iter().fold(
-            (-1.0, Side::PlusZ),
+            (-1.0, UpSide::PlusZ),
             |best, one| if one.0 > best.0 { one } else { best },
         );
         self.setup(best.1)
@@ -130,7 +130,7 @@ impl<'a> Planner<'a> {
 
     /// What the tool reaches of each face, in the order of the faces; why it is not known where a face has no surface. `done` is called after each, from several threads.
     #[must_use]
-    pub fn reaches(&self, setup: &Setup, done: impl Fn() + Sync) -> Vec<Result<FaceReach, CadError>> {
+    pub fn reaches(&self, setup: &PartSetup, done: impl Fn() + Sync) -> Vec<Result<FaceReach, CadError>> {
         let found = self.faces.par_iter().map(|(face, surface)| {
             let reach = match surface {
                 Ok(surface) => Ok(setup.reach(face, surface, REACH_SIDE)),
@@ -144,7 +144,7 @@ impl<'a> Planner<'a> {
 
     /// The plan of each face, in the order of the faces. `done` is called after each, from several threads.
     #[must_use]
-    pub fn plans(&self, setup: &Setup, folder: &JobFolder, done: impl Fn() + Sync) -> Vec<FacePlan> {
+    pub fn plans(&self, setup: &PartSetup, folder: &JobFolder, done: impl Fn() + Sync) -> Vec<FacePlan> {
         let plans = self.faces.par_iter().map(|(face, surface)| {
             let plan = self.plan(setup, folder, face, surface);
             done();
@@ -154,7 +154,7 @@ impl<'a> Planner<'a> {
     }
 
     /// The better plan of those with each surface that a face can have.
-    fn plan(&self, setup: &Setup, folder: &JobFolder, face: &Face, by_edges: &FaceSurface) -> FacePlan {
+    fn plan(&self, setup: &PartSetup, folder: &JobFolder, face: &Face, by_edges: &FaceSurface) -> FacePlan {
         let mut plan = self.plan_with(setup, folder, face, by_edges);
         // Lines between edges that are not parallel spread: the surface's own parameters may take less time.
         if by_edges.as_ref().is_ok_and(|surface| surface.by_edges) {
@@ -171,7 +171,7 @@ impl<'a> Planner<'a> {
 
     /// The order in which the faces that have a job are machined.
     #[must_use]
-    pub fn order(&self, setup: &Setup, plans: &[FacePlan]) -> FaceOrder {
+    pub fn order(&self, setup: &PartSetup, plans: &[FacePlan]) -> FaceOrder {
         let jobs = plans.iter().enumerate();
         let (faces, ends_mm): (Vec<usize>, Vec<_>) = jobs
             .filter_map(|(index, plan)| Some((index, plan.job.as_ref()?.ends_mm)))

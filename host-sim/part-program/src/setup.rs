@@ -10,12 +10,12 @@ use patches::placement::Rotation;
 
 /// Default of the machine's range, mm: a part that reaches farther from the origin is moved to it.
 const RANGE_MM: f64 = 2000.0;
-/// Places a side of a face at which both sides of a face of no solid are compared.
+/// Places along each parameter at which the two sides of a face that bounds no solid are compared, and by which a face that is not reached is found.
 pub(crate) const LOOK_SIDE: usize = 12;
 
 /// The side of the part that looks up on the machine, in the axes of the file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Side {
+pub enum UpSide {
     /// The file's +z.
     PlusZ,
     /// Its -z.
@@ -30,7 +30,7 @@ pub enum Side {
     MinusY,
 }
 
-impl Side {
+impl UpSide {
     /// All of them, in the order in which they are tried.
     pub const ALL: [Self; 6] = [
         Self::PlusZ,
@@ -69,9 +69,9 @@ impl Side {
 }
 
 /// How a part lies on the machine, and the tool over it.
-pub struct Setup {
+pub struct PartSetup {
     /// The side that looks up.
-    pub side: Side,
+    pub side: UpSide,
     /// Translation of the part after its rotation, mm.
     pub translate_mm: [f64; 3],
     /// From the file to the machine.
@@ -84,10 +84,10 @@ pub struct Setup {
     pub scallop_mm: f64,
 }
 
-impl Setup {
+impl PartSetup {
     /// With this side up, where the file places the part; a part that reaches more than 2 m from the origin is centred on it.
     #[must_use]
-    pub fn new(side: Side, model: &Arc<Model>, tool: Tool, scallop_mm: f64) -> Self {
+    pub fn new(side: UpSide, model: &Arc<Model>, tool: Tool, scallop_mm: f64) -> Self {
         let linear = Rotation::of_degrees(side.rotate_deg()).0;
         let rows = |by: [f64; 3]| Placement {
             rows: std::array::from_fn(|i| [linear[i][0], linear[i][1], linear[i][2], by[i]]),

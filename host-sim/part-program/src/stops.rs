@@ -1,4 +1,4 @@
-//! The faces of a job of many, one after the other: the run of a face ends straight above the start of the next one, as low as the part allows, and that one begins there.
+//! The runs of the faces of a job of many, one after the other: each ends straight above the start of the next one, as low as the part allows, and the next one begins there.
 //!
 //! Where something else than the part may be in the way, or the part is not known, each run begins and ends at the job's home.
 
@@ -36,7 +36,7 @@ impl Stop {
     }
 }
 
-/// What of a face decides where its neighbours' runs end and begin.
+/// A face whose run may begin or end beside its neighbours', and the places that decide where.
 struct Visit {
     job: Job,
     home_nm: [i32; 3],

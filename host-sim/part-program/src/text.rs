@@ -6,7 +6,7 @@ use std::path::Path;
 use crate::face::FacePlan;
 use crate::order::FaceOrder;
 use crate::planner::{JobFolder, Planner};
-use crate::setup::Setup;
+use crate::setup::PartSetup;
 use crate::sums::percent;
 
 impl Planner<'_> {
@@ -14,7 +14,7 @@ impl Planner<'_> {
     #[must_use]
     pub fn text(
         &self,
-        setup: &Setup,
+        setup: &PartSetup,
         folder: &JobFolder,
         output: &Path,
         order: &FaceOrder,
@@ -42,7 +42,7 @@ impl Planner<'_> {
     }
 
     /// The keys that all faces have in common.
-    fn head(&self, setup: &Setup, folder: &JobFolder, output: &Path, faces: &[&FacePlan]) -> String {
+    fn head(&self, setup: &PartSetup, folder: &JobFolder, output: &Path, faces: &[&FacePlan]) -> String {
         let path = folder.source.as_deref().unwrap_or_default();
         let radius_mm = self.cut.radius_mm;
         let mut out = format!(

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use cad::{Face, Model};
 use clap::ValueEnum;
 use job::FaceReach;
-use part_program::{CutOptions, FaceOrder, FacePlan, JobFolder, Planner, Setup, Side};
+use part_program::{CutOptions, FaceOrder, FacePlan, JobFolder, PartSetup, Planner, UpSide};
 
 use super::super::out::say;
 use super::super::{Failure, Result, output_file, progress};
@@ -47,14 +47,14 @@ pub(super) enum Up {
 
 impl Up {
     /// The side; `None`: chosen automatically.
-    const fn side(self) -> Option<Side> {
+    const fn side(self) -> Option<UpSide> {
         match self {
-            Self::PlusZ => Some(Side::PlusZ),
-            Self::MinusZ => Some(Side::MinusZ),
-            Self::PlusX => Some(Side::PlusX),
-            Self::MinusX => Some(Side::MinusX),
-            Self::PlusY => Some(Side::PlusY),
-            Self::MinusY => Some(Side::MinusY),
+            Self::PlusZ => Some(UpSide::PlusZ),
+            Self::MinusZ => Some(UpSide::MinusZ),
+            Self::PlusX => Some(UpSide::PlusX),
+            Self::MinusX => Some(UpSide::MinusX),
+            Self::PlusY => Some(UpSide::PlusY),
+            Self::MinusY => Some(UpSide::MinusY),
             Self::Auto => None,
         }
     }
@@ -126,7 +126,7 @@ impl<'a> Output<'a> {
 struct Planned<'a> {
     file: &'a str,
     model: &'a Model,
-    setup: &'a Setup,
+    setup: &'a PartSetup,
     plans: &'a [FacePlan],
     order: &'a FaceOrder,
     /// The job of each face that has one, in the order of the plans.
@@ -236,7 +236,7 @@ pub(super) fn reaches(
     let cut = cut(arguments, radius_mm);
     let bar = progress(faces.len() as u64, "reach");
     let planner = Planner::new(file, model, faces, &cut);
-    let found = planner.reaches(&planner.setup(Side::PlusZ), || bar.inc(1));
+    let found = planner.reaches(&planner.setup(UpSide::PlusZ), || bar.inc(1));
     bar.finish_and_clear();
     found
         .into_iter()
