@@ -3,7 +3,7 @@
 //! ```text
 //! job file ──job-file──► job ──machine──► Prepared ──► samples ──inspect──► figures ──report──► page
 //!    ▲                    │                  │                     ▲
-//!   cad                   │                  └──► a board, QEMU    │
+//!   cad, part-program     │                  └──► a board, QEMU    │
 //!                         └──oracle──► verify ─────────────────────┘
 //! ```
 

@@ -8,8 +8,9 @@
 //!          ├─ scallops.rs ─► heights ───────────┤   viewer/: scripts ──┘
 //!          ├─ binding.rs ──► speed and limits ──┤
 //!          └─ setting.rs ──► marks, machine ────┘
-//! study of the paper ─► chart.rs, paper/ ──────────────────────────────► index.html of `cargo sim paper`
 //! ```
+//!
+//! `page`, `number` and `svg` also serve the page of `cargo sim paper` (crate `study`).
 //!
 //! The path is drawn from the emitted samples; the surface, the arc lengths, the errors and the distances between passes come
 //! from the oracle. The output contains no local path and loads nothing from the network.

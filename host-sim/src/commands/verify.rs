@@ -25,8 +25,8 @@ use super::{
 
 /// Checks a job before it runs on a machine. Every sample against an independent f64 oracle: positions, normals, feed ripple, path
 /// intervals, schedule. The swept envelope of the ball against the surface: scallop height, local and global gouges. Axis travel. With
-/// axis limits: the share of each limit that the samples use, and the duration of the first, middle and last pass against the
-/// optimum. Least concave radius, machining time, size of the surface data.
+/// axis limits: the share of each limit that the samples use, and the duration of the first, middle and last pass, and of those
+/// that could be slowest, against the optimum. Least concave radius, machining time, size of the surface data.
 ///
 /// Several jobs are verified one after the other; the JSON object then has the list `jobs`, with an error for one that cannot be read.
 ///
@@ -50,7 +50,7 @@ pub(super) struct Arguments {
     /// Overwrites existing files of --report.
     #[arg(long)]
     force: bool,
-    /// Computes the optimum of the first, middle and last pass within default axis limits if the job sets none.
+    /// Computes the optimum within default axis limits if the job sets none: of the first, middle and last pass.
     #[arg(long)]
     optimum: bool,
     /// Accepts scallops this much above the limit: in percent, or as a share (1% or 0.01).

@@ -1,6 +1,6 @@
 //! What is fuzzed: one function for each input that comes from outside. Each takes any bytes, and panics where the code breaks a promise.
 //!
-//! Seeded on the stable toolchain, 15 s each in `./check`: `cargo run -p fuzz-targets -- TARGET SECONDS` (see `main.rs`). Campaigns:
+//! Seeded on the stable toolchain, 10 s each in `./check`: `cargo run -p fuzz-targets -- TARGET SECONDS` (see `main.rs`). Campaigns:
 //! `cargo +nightly fuzz run TARGET fuzz/corpus/TARGET tests/fuzz/seeds/TARGET`, with the targets of `fuzz/`, which call the same functions.
 
 mod job_file;

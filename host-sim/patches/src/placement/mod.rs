@@ -1,7 +1,7 @@
 //! Placement of the surface on the machine: scale, rotation and translation, applied before all other processing.
 //!
 //! ```text
-//! [placement] ─job_file/placement.rs─► Placement ─place─► SurfaceSpec of the placed surface ─► oracle, preparation
+//! [placement] ─job-file/placement.rs─► Placement ─place─► SurfaceSpec of the placed surface ─► oracle, preparation
 //!                                                  extent.rs  its bounding box, for `place` and the range check
 //!                                                  arcs.rs    a revolved profile as a rational B-spline
 //! ```
