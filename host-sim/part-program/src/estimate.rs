@@ -1,23 +1,24 @@
-//! An estimate of the passes of a face along each parameter: their time, and the share of the face that they leave where the region ends.
+//! An estimate of the passes of a face along each parameter: their time, and the share of the face that they leave above the scallop limit at the region's boundary.
 //!
-//! Where nothing is in the way a region is larger than its face, so passes may end anywhere. Where something is, they end on its boundary: one that is slanted to them keeps
-//! a strip that is higher than the limit, between the ends of passes. Across the boundary nothing is left, so the direction decides.
+//! Without an obstacle a region is larger than its face, and the ends of passes lie outside the face. At an obstacle the region ends on the face. Passes that meet this
+//! boundary at a slant leave a strip above the limit between their ends; passes across it leave none. So the direction of the passes decides what is left.
 
 use job::{Along, Region};
 use machine::PASS_S;
 use part::LEFTOVER_SHARE;
 
-/// Greatest number of lines of an estimate, and parts of an interval.
+/// Greatest number of lines of an estimate.
 const LINES_MAX: usize = 4000;
+/// Parts of an interval for the sum of its length.
 const PARTS: u32 = 8;
-/// Shortest interval, in step-overs, as in jobs.
-const LEAST_STEPS: f64 = 0.1;
-/// Greatest height of a place that is finished, in scallop limits, as `verify` counts it.
-const HIGHER: f64 = 1.0 + LEFTOVER_SHARE;
-/// Lines on either side of a place that may serve it.
-const BESIDE: usize = 3;
-/// Share of the area that may be left for the faster direction.
-const LEFT_SHARE: f64 = 0.005;
+/// Shortest interval, in step-overs: jobs leave out shorter ones.
+const INTERVAL_MIN_STEPS: f64 = 0.1;
+/// Greatest height of a finished place, in scallop limits: the bound of `verify`.
+const FINISHED_HEIGHT: f64 = 1.0 + LEFTOVER_SHARE;
+/// Lines on either side of a place whose passes may finish it.
+const LINES_BESIDE: usize = 3;
+/// Greatest share of the area that a direction may leave to be chosen for its time.
+const LEFT_SHARE_MAX: f64 = 0.005;
 
 /// Estimates the passes of a face.
 #[derive(Clone, Copy)]
@@ -28,28 +29,28 @@ pub(crate) struct PassEstimator<'a> {
     pub(crate) feed_mm_s: f64,
     /// Every other pass goes back.
     pub(crate) is_zigzag: bool,
-    /// Places of the face, each with its area.
+    /// Places (u, v) of the face, each with its area, mm2.
     pub(crate) places: &'a [([f64; 2], f64)],
 }
 
 /// The passes of a face along a parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PassEstimate {
-    /// The parameter.
+    /// The path parameter.
     pub along: Along,
-    /// Their time, s.
+    /// Time of the passes, s.
     pub time_s: f64,
-    /// Share of the face's area that they leave above the scallop limit.
+    /// Share of the face's area above the scallop limit after the passes.
     pub left_share: f64,
-    /// (u, v) at the start of the first and at the end of the last one; `None` without passes.
+    /// (u, v) at the start of the first pass and at the end of the last one; `None` without passes.
     pub ends: Option<[[f64; 2]; 2]>,
 }
 
 impl PassEstimate {
-    /// Whether these passes are better than others: less time, of those that leave little, else less that is left.
+    /// Whether these passes are better than others: by their time if both leave at most [`LEFT_SHARE_MAX`], else by the share that they leave.
     #[must_use]
     pub fn is_better_than(&self, other: &Self) -> bool {
-        match [self, other].map(|estimate| estimate.left_share <= LEFT_SHARE) {
+        match [self, other].map(|estimate| estimate.left_share <= LEFT_SHARE_MAX) {
             [true, true] => self.time_s < other.time_s,
             [false, false] => self.left_share < other.left_share,
             [is_better, _] => is_better,
@@ -57,13 +58,23 @@ impl PassEstimate {
     }
 }
 
-/// A line of constant side parameter, and its intervals.
+/// A line of constant side parameter, and its intervals of the path parameter.
 struct Line {
     side: f64,
     intervals: Vec<[f64; 2]>,
 }
 
-/// `[path, side]` of (u, v), and back.
+/// Lengths of the surface's derivatives at a place, mm per unit of the parameter.
+struct DerivativeLengths {
+    /// By the path parameter.
+    path: f64,
+    /// By the side parameter.
+    side: f64,
+    /// The component of the latter at right angles to the pass.
+    across: f64,
+}
+
+/// `[path, side]` of (u, v), and (u, v) of `[path, side]`.
 const fn swapped(along: Along, [u, v]: [f64; 2]) -> [f64; 2] {
     match along {
         Along::U => [u, v],
@@ -71,7 +82,7 @@ const fn swapped(along: Along, [u, v]: [f64; 2]) -> [f64; 2] {
     }
 }
 
-/// Ranges of `[path, side]`.
+/// Ranges of `[path, side]` from those of (u, v).
 const fn swapped_ranges(along: Along, [u, v]: [[f64; 2]; 2]) -> [[f64; 2]; 2] {
     match along {
         Along::U => [u, v],
@@ -80,33 +91,33 @@ const fn swapped_ranges(along: Along, [u, v]: [[f64; 2]; 2]) -> [[f64; 2]; 2] {
 }
 
 impl PassEstimator<'_> {
-    /// The direction that takes less time, of those that leave little; else the one that leaves less.
+    /// The better direction by [`PassEstimate::is_better_than`].
     pub(crate) fn best(&self) -> PassEstimate {
         let [u, v] = [Along::U, Along::V].map(|along| self.along(along));
         if v.is_better_than(&u) { v } else { u }
     }
 
-    /// Length of the derivative along a pass, and of that across it the whole and what is at right angles.
-    fn speeds(&self, along: Along, path: f64, side: f64) -> [f64; 3] {
+    fn lengths(&self, along: Along, path: f64, side: f64) -> DerivativeLengths {
         let [u, v] = swapped(along, [path, side]);
         let at = self.surface.at(u, v);
-        let [path, side] = match along {
+        let [by_path, by_side] = match along {
             Along::U => [at.u, at.v],
             Along::V => [at.v, at.u],
         };
-        let [speed, whole] = [path.length(), side.length()];
-        let across = if speed > 0.0 {
-            path.cross(side).length() / speed
+        let [path, side] = [by_path.length(), by_side.length()];
+        let across = if path > 0.0 {
+            by_path.cross(by_side).length() / path
         } else {
-            whole
+            side
         };
-        [speed, whole, across]
+        DerivativeLengths { path, side, across }
     }
 
-    /// How much a step across is where a pass ends on the surface's boundary, which may be slanted: the crest there lies between the end of one pass and the foot on the other.
+    /// Width of the gap per unit of the side parameter where a pass ends on the surface's boundary, which may be slanted: the crest there lies between the end of one pass
+    /// and the foot on the other, so the width is the harmonic mean of the distances along the boundary and across the pass.
     fn across_end(&self, along: Along, path: f64, side: f64) -> f64 {
-        let [_, whole, across] = self.speeds(along, path, side);
-        2.0 * across * whole / (across + whole).max(f64::MIN_POSITIVE)
+        let DerivativeLengths { side, across, .. } = self.lengths(along, path, side);
+        2.0 * across * side / (across + side).max(f64::MIN_POSITIVE)
     }
 
     /// The passes along a parameter.
@@ -118,9 +129,11 @@ impl PassEstimator<'_> {
             .collect();
         let [u, v] = self.region.extent().map(|[low, high]| 0.5 * (low + high));
         let [path, side] = swapped(along, [u, v]);
-        let [_, across, _] = self.speeds(along, path, side);
+        let side_length = self.lengths(along, path, side).side;
         let [_, sides] = swapped_ranges(along, self.surface.domain());
-        let [low, high] = self.region.trimmed_lines(along, self.step_over_mm, across, sides);
+        let [low, high] = self
+            .region
+            .trimmed_lines(along, self.step_over_mm, side_length, sides);
         let least = (high - low) / LINES_MAX as f64;
         let (mut lines, mut time_s) = (Vec::new(), 0.0);
         let mut side = low;
@@ -162,7 +175,7 @@ impl PassEstimator<'_> {
         Some([[*start, first.side], [end, last.side]].map(|place| swapped(along, place)))
     }
 
-    /// A line, the longest derivative across it, and its time.
+    /// The line at a side parameter, the greatest width of the gap beside it per unit of the side parameter, mm, and the time of its passes, s.
     fn line(&self, along: Along, edges: &[[[f64; 2]; 2]], side: f64) -> (Line, f64, f64) {
         let met = |ends: &&[[f64; 2]; 2]| (ends[0][1] <= side) != (ends[1][1] <= side);
         let mut crossings: Vec<f64> = edges
@@ -178,9 +191,9 @@ impl PassEstimator<'_> {
             let mut length_mm = 0.0;
             for part in 0..PARTS {
                 let share = (f64::from(part) + 0.5) / f64::from(PARTS);
-                let [speed, _, across] = self.speeds(along, from + share * (to - from), side);
-                length_mm += speed * (to - from) / f64::from(PARTS);
-                widest = widest.max(across);
+                let lengths = self.lengths(along, from + share * (to - from), side);
+                length_mm += lengths.path * (to - from) / f64::from(PARTS);
+                widest = widest.max(lengths.across);
             }
             for end in [*from, *to] {
                 if ends
@@ -190,7 +203,7 @@ impl PassEstimator<'_> {
                     widest = widest.max(self.across_end(along, end, side));
                 }
             }
-            if length_mm >= LEAST_STEPS * self.step_over_mm {
+            if length_mm >= INTERVAL_MIN_STEPS * self.step_over_mm {
                 time_s += length_mm / self.feed_mm_s + PASS_S;
                 intervals.push([*from, *to]);
             }
@@ -198,24 +211,24 @@ impl PassEstimator<'_> {
         (Line { side, intervals }, widest, time_s)
     }
 
-    /// Share of the places that are too far from every pass.
+    /// Share of the area of the places that no pass finishes: each is too far from every pass.
     fn left_share(&self, along: Along, lines: &[Line]) -> f64 {
-        let within_mm = 0.5 * self.step_over_mm * HIGHER.sqrt();
+        let within_mm = 0.5 * self.step_over_mm * FINISHED_HEIGHT.sqrt();
         let (mut all, mut left) = (0.0, 0.0);
         for (place, area) in self.places {
             let [path, side] = swapped(along, *place);
-            let [speed, _, across] = self.speeds(along, path, side);
+            let lengths = self.lengths(along, path, side);
             let above = lines.partition_point(|line| line.side < side);
-            let near = &lines[above.saturating_sub(BESIDE)..(above + BESIDE).min(lines.len())];
-            let is_served = near.iter().any(|line| {
-                let beside_mm = (line.side - side) * across;
+            let near = &lines[above.saturating_sub(LINES_BESIDE)..(above + LINES_BESIDE).min(lines.len())];
+            let is_finished = near.iter().any(|line| {
+                let beside_mm = (line.side - side) * lengths.across;
                 line.intervals.iter().any(|[from, to]| {
-                    let beyond_mm = (from - path).max(path - to).max(0.0) * speed;
+                    let beyond_mm = (from - path).max(path - to).max(0.0) * lengths.path;
                     beside_mm.hypot(beyond_mm) <= within_mm
                 })
             });
             all += area;
-            if !is_served {
+            if !is_finished {
                 left += area;
             }
         }
@@ -225,7 +238,7 @@ impl PassEstimator<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::{LEFT_SHARE, PassEstimator};
+    use super::{LEFT_SHARE_MAX, PassEstimator};
     use job::{Along, Region};
 
     /// A plane of 20 mm x 10 mm whose region ends on a line that is slanted by 1 in 20 to u: passes along u take less time, but leave a strip there.
@@ -253,7 +266,7 @@ mod tests {
         let [u, v] = [Along::U, Along::V].map(|along| passes.along(along));
         assert!(u.time_s < v.time_s, "{} {}", u.time_s, v.time_s);
         assert!(
-            u.left_share > LEFT_SHARE && v.left_share < 0.001,
+            u.left_share > LEFT_SHARE_MAX && v.left_share < 0.001,
             "{} {}",
             u.left_share,
             v.left_share

@@ -9,24 +9,27 @@ use part::{Inside, State};
 
 use crate::estimate::{PassEstimate, PassEstimator};
 use crate::planner::{FaceSurface, JobFolder, Planner};
-use crate::setup::{LOOK_SIDE, PartSetup};
+use crate::setup::{COARSE_PLACES, PartSetup};
 
 /// Places along each parameter at which the reach of a face is measured.
-pub(crate) const REACH_SIDE: usize = 64;
+pub(crate) const REACH_PLACES: usize = 64;
 
-/// Cells a side of the picture of a face as large as the part, and the least and the most of a face: of a part of few faces, and of many.
+/// Picture cells along each parameter of a face as large as the part; smaller faces have fewer in proportion.
 const CELLS: f64 = 80.0;
-const CELLS_OF_FACE: [[f64; 2]; 2] = [[24.0, 48.0], [6.0, 32.0]];
-/// Number of faces above which they are many.
+/// Least and greatest number of picture cells along each parameter of a face.
+const CELLS_RANGE: [f64; 2] = [24.0, 48.0];
+/// [`CELLS_RANGE`] for a part of more than [`MANY`] faces, so that its picture stays small.
+const CELLS_RANGE_OF_MANY: [f64; 2] = [6.0, 32.0];
+/// Number of faces above which a part has many.
 const MANY: usize = 100;
 
 /// Why a face has no job.
 #[derive(Debug, thiserror::Error)]
 pub enum FaceRefused {
-    /// It has no surface that the board machines.
+    /// The face has no surface that the board machines.
     #[error("{}", .0.what)]
     Surface(CadError),
-    /// No job can be written for it.
+    /// No job can be written for the face.
     #[error("{0}")]
     Options(CadError),
     /// The job is not valid.
@@ -43,48 +46,48 @@ pub struct FaceJob {
     pub region: Region,
     /// The surface, placed.
     pub surface: SurfaceSpec,
-    /// Its passes.
+    /// The passes, estimated.
     pub passes: PassEstimate,
-    /// The ball's centre at the start of the first pass and at the end of the last, mm; an estimate.
+    /// Estimated position of the ball's centre at the start of the first pass and at the end of the last one, mm.
     pub ends_mm: [DVec3; 2],
 }
 
-/// What becomes of a face.
+/// The plan of a face: its reach, and its job or the reason for having none.
 #[derive(Debug)]
 pub struct FacePlan {
-    /// Its number in the file.
+    /// Number of the face in the file.
     pub number: usize,
-    /// Its reach; `None` if the face is not known.
+    /// Reach of the tool over the face; `None` if it was not measured: without a surface, or without a valid job.
     pub reach: Option<FaceReach>,
-    /// Its job; `None` where it is refused, or the tool reaches nothing of it.
+    /// Job of the face; `None` where it is refused, or the tool reaches nothing of it.
     pub job: Option<FaceJob>,
-    /// Why it has no job, where that is not its reach.
+    /// Why the face is refused; `None` for one with a job, and for one that the tool does not reach.
     pub refused: Option<FaceRefused>,
-    /// UpSide of the tool, as in job files.
+    /// Machined side, sign on `S_u x S_v`: `"+"` or `"-"`, as in job files.
     pub side: &'static str,
     /// Parameters of the surface.
     pub parameters: FaceParameters,
-    /// The face in cells, mm, each with what becomes of it: for a picture. Empty for a plane, whose regions are exact polygons.
+    /// Picture of the face: corners of each cell, mm, and the state of its middle. Empty for a plane, whose regions are exact polygons.
     pub cells: Vec<(State, [DVec3; 4])>,
     surface: Option<Arc<MachinableFace>>,
 }
 
 impl FacePlan {
-    /// Without a job.
+    /// A plan without reach and job.
     fn new(face: &Face) -> Self {
         Self {
             number: face.number,
             reach: None,
             job: None,
             refused: None,
-            side: if face.sense > 0.0 { "+" } else { "-" },
+            side: side_of(face),
             parameters: FaceParameters::default(),
             cells: Vec::new(),
             surface: None,
         }
     }
 
-    /// Whether its job is better than another one's, by the rule for the direction of passes.
+    /// Whether this plan's job is better than the other plan's ([`PassEstimate::is_better_than`]); a job is better than none.
     pub(crate) fn is_better_than(&self, other: &Self) -> bool {
         match (&self.job, &other.job) {
             (Some(job), Some(other)) => job.passes.is_better_than(&other.passes),
@@ -92,13 +95,13 @@ impl FacePlan {
         }
     }
 
-    /// Time of the passes, s, an estimate; 0 without a job.
+    /// Estimated time of the passes, s; 0 without a job.
     #[must_use]
     pub fn passes_s(&self) -> f64 {
         self.job.as_ref().map_or(0.0, |job| job.passes.time_s)
     }
 
-    /// Makes the cells of the picture: smaller ones on larger faces.
+    /// Makes the cells of the picture: more of them on a larger face.
     pub(crate) fn draw(&mut self, setup: &PartSetup, face: &Face) {
         let Some(surface) = self.surface.as_ref().filter(|_| face.surface.kind() != "plane") else {
             return;
@@ -109,7 +112,11 @@ impl FacePlan {
             .into_iter()
             .fold(0.0, f64::max)
             / (block.high - block.low).max_element();
-        let [least, most] = CELLS_OF_FACE[usize::from(setup.part.faces.len() > MANY)];
+        let [least, most] = if setup.part.faces.len() > MANY {
+            CELLS_RANGE_OF_MANY
+        } else {
+            CELLS_RANGE
+        };
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
         let side = (CELLS * share).clamp(least, most) as usize;
         let loops = self
@@ -117,12 +124,17 @@ impl FacePlan {
             .as_ref()
             .map_or([].as_slice(), |job| job.region.loops.as_slice());
         let sign = if self.side == "-" { -1.0 } else { 1.0 };
-        self.cells = setup.request(face, sign, surface, |request| request.picture(loops, side));
+        self.cells = setup.with_request(face, sign, surface, |request| request.picture(loops, side));
     }
 }
 
+/// The machined side of a face as in job files.
+const fn side_of(face: &Face) -> &'static str {
+    if face.sense > 0.0 { "+" } else { "-" }
+}
+
 impl Planner<'_> {
-    /// The plan of a face with a surface.
+    /// The plan of a face with this surface.
     pub(crate) fn plan_with(
         &self,
         setup: &PartSetup,
@@ -141,7 +153,7 @@ impl Planner<'_> {
         };
         let face = &Face {
             sense: setup.sign(face, surface),
-            // From here on its side is known.
+            // The machined side is known from here on.
             solid: true,
             ..face.clone()
         };
@@ -150,16 +162,16 @@ impl Planner<'_> {
             surface: Some(Arc::clone(surface)),
             ..FacePlan::new(face)
         };
-        // Where a few places show that something is reached, the region measures how much.
-        if setup.reach(face, surface, LOOK_SIDE).reachable_mm2 == 0.0 {
-            let reach = setup.reach(face, surface, REACH_SIDE);
+        // Where a coarse look finds reachable places, making the region measures the reach.
+        if setup.reach(face, surface, COARSE_PLACES).reachable_mm2 == 0.0 {
+            let reach = setup.reach(face, surface, REACH_PLACES);
             let is_reached = reach.reachable_mm2 > 0.0;
             plan.reach = Some(reach);
             if !is_reached {
                 return plan;
             }
         }
-        match self.read_back(setup, folder, face, surface) {
+        match self.written_job(setup, folder, face, surface) {
             Ok((job, text)) => {
                 if let Some(reach) = job.origin.reach() {
                     plan.reach = Some(reach.clone());
@@ -171,8 +183,8 @@ impl Planner<'_> {
         plan
     }
 
-    /// The job of a face and its text, with passes along u unless the direction is given.
-    fn read_back(
+    /// Writes the job of a face and reads it, which makes its region: the job and its text. Passes are along u unless the direction is given.
+    fn written_job(
         &self,
         setup: &PartSetup,
         folder: &JobFolder,
@@ -184,7 +196,7 @@ impl Planner<'_> {
             feed_mm_min: self.cut.feed_mm_min,
             scallop_mm: Some(setup.scallop_mm),
             along: Some(self.cut.along.clone().unwrap_or_else(|| "u".to_owned())),
-            side: Some(FacePlan::new(face).side.to_owned()),
+            side: Some(side_of(face).to_owned()),
             pattern: self.cut.pattern.clone(),
             in_part: true,
             rotate_deg: setup.side.rotate_deg(),
@@ -195,13 +207,13 @@ impl Planner<'_> {
                 .map(|source| (source, self.cut.tolerance_mm)),
         };
         let written = write_job(self.file, face, surface, &options).map_err(FaceRefused::Options)?;
-        // In the folder: paths are relative to it, and the region is kept there.
+        // A path in the folder: the job's paths are relative to it, and the region is cached beside it.
         let path = folder.path.join("face.toml");
         let job = job_file::parse_with(&path.display().to_string(), &written.text, &part::Faces);
         job.map(|job| (job, written.text)).map_err(FaceRefused::Job)
     }
 
-    /// Region, direction, time and text of a job; `None` if it has no region.
+    /// The job of a face with its direction chosen; `None` if it has no region.
     fn face_job(
         &self,
         setup: &PartSetup,
@@ -215,8 +227,8 @@ impl Planner<'_> {
         let region = job.region?;
         let surface = oracle::Surface::new(&job.surface);
         let inside = Inside::new(&region.loops);
-        let mut places = setup.request(face, face.sense, machinable, |request| {
-            request.places(&Inside::new(request.trimmed), REACH_SIDE)
+        let mut places = setup.with_request(face, face.sense, machinable, |request| {
+            request.places(&Inside::new(request.trimmed), REACH_PLACES)
         });
         places.retain(|(place, _)| inside.contains(*place));
         let estimator = PassEstimator {

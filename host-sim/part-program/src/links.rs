@@ -9,11 +9,8 @@ use machine::links::{self, Link};
 use machine::prepare::Prepared;
 use part::Way;
 
-/// The ball's centre at the start and at the end of each pass of a job, nm. The passes are the same wherever the run begins and ends.
-///
-/// # Errors
-/// None: those of the cache.
-pub(crate) fn passes(job: &Job, prepared: &Prepared) -> Result<Vec<[[i32; 3]; 2]>, FaceError> {
+/// The ball's centre at the start and at the end of each pass of a job, nm. They depend neither on the links nor on where the run begins and ends.
+pub(crate) fn passes(job: &Job, prepared: &Prepared) -> Vec<[[i32; 3]; 2]> {
     let mut bare = prepared.clone();
     if let Some(axes) = &mut bare.header.axes {
         (axes.home_nm, axes.end_nm) = ([0, 0, axes.safe_z_nm], None);
@@ -23,13 +20,13 @@ pub(crate) fn passes(job: &Job, prepared: &Prepared) -> Result<Vec<[[i32; 3]; 2]
     part::passes(job, key.as_bytes(), || links::passes(&bare))
 }
 
-/// Whether nothing but the part may stand between two places: the job names neither its safe height nor a clamp nor the stock.
+/// Whether the part is the only known obstacle between two places: the job names neither its safe height nor a clamp nor the stock.
 pub(crate) fn only_part_between(job: &Job) -> bool {
     job.machine.safe_z_mm.is_none() && job.setup.fixtures.is_empty() && job.setup.stock.is_none()
 }
 
-/// The word of a link that goes this way.
-fn link(way: Way) -> Link {
+/// A way as a link of the core: heights in nm, rounded up.
+fn link_of(way: Way) -> Link {
     match way {
         Way::Straight => Link::Straight,
         Way::Around { aside, rise } => Link::Around(Detour { aside, rise }),
@@ -37,7 +34,7 @@ fn link(way: Way) -> Link {
     }
 }
 
-/// How each link of a job goes, from the first to the second pass on.
+/// The links of a job, the one from the first pass to the second first; none without axis limits.
 ///
 /// # Errors
 /// The part's file cannot be read.
@@ -45,7 +42,7 @@ fn links_of(job: &Job, prepared: &Prepared) -> Result<Vec<Link>, FaceError> {
     let Some(axes) = prepared.header.axes else {
         return Ok(Vec::new());
     };
-    let passes = passes(job, prepared)?;
+    let passes = passes(job, prepared);
     let key = format!("{passes:?}");
     let ends = || {
         let ends = links::between(&passes);
@@ -53,11 +50,11 @@ fn links_of(job: &Job, prepared: &Prepared) -> Result<Vec<Link>, FaceError> {
         ends.into_iter().map(|ends| ends.map(place)).collect()
     };
     let ways = part::ways(job, key.as_bytes(), millimetres(axes.safe_z_nm), ends)?;
-    Ok(ways.into_iter().map(link).collect())
+    Ok(ways.into_iter().map(link_of).collect())
 }
 
-/// Gives a job with a region and axis limits the words of its links. Where the job names its safe height, a clamp or the stock, every link goes at the safe height: the part
-/// is then not all that may stand between two intervals.
+/// Gives a job with a region and axis limits the words of its links. A job that names its safe height, a clamp or the stock gets none, so that every link goes at the safe
+/// height: the part is then not the only obstacle. Words that the job already has stay.
 ///
 /// # Errors
 /// The part's file cannot be read.

@@ -1,34 +1,35 @@
-//! The order of the faces: the one whose links take least time. From home to the nearest face, from its end to the nearest start, and so on; then faces are moved and runs of faces are
-//! turned round as long as that saves time. The links themselves are made when the job is read, by exact distances.
+//! The order of the faces by the time of the links between them: nearest neighbour from home, then 2-opt and or-opt. A local minimum, not proven to be the least time.
+//!
+//! Heights of these links are from a map of the part; when the job is read, the links are made by exact distances.
 
 use glam::DVec3;
 use part::{HeightMap, Times};
 
-/// Rounds of the improvement, at most.
-const ROUNDS: usize = 20;
-/// Most faces that are moved together.
-const MOVED: usize = 3;
-/// What is saved at least, s: less is rounding.
-const SAVED_S: f64 = 1e-6;
+/// Largest number of rounds of 2-opt and or-opt.
+const ROUNDS_MAX: usize = 20;
+/// Largest number of consecutive faces that or-opt moves together.
+const MOVED_MAX: usize = 3;
+/// Least saving of an accepted change, s; a smaller one is rounding.
+const SAVED_MIN_S: f64 = 1e-6;
 
 /// The faces that have a job, in the order of machining.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FaceOrder {
-    /// Their indices among the plans.
+    /// Indices of the faces among the plans.
     pub faces: Vec<usize>,
-    /// Time of the links from home through all of them and back, s; an estimate.
+    /// Estimated time of the links from home through all faces and back, s.
     pub links_s: f64,
 }
 
-/// Times of the links between the faces of a part. A face is its index, home the index behind the last one.
+/// Times of the links between the faces of a part. Faces are numbered from 0; the number after the last face is home.
 pub(crate) struct FaceLinks {
-    faces: usize,
-    /// From the face of the row to that of the column, s.
+    face_count: usize,
+    /// Matrix, row by row: the time from the end of the row's face to the start of the column's, s.
     times_s: Vec<f64>,
 }
 
 impl FaceLinks {
-    /// Between faces whose passes start and end here, the ball's centre, mm.
+    /// `faces_mm`: the ball's centre at the start of the first pass and at the end of the last pass of each face.
     pub(crate) fn new(heights: &HeightMap, times: &Times, faces_mm: &[[DVec3; 2]], home_mm: DVec3) -> Self {
         let ends: Vec<[DVec3; 2]> = faces_mm.iter().copied().chain([[home_mm; 2]]).collect();
         let pairs = ends
@@ -36,25 +37,25 @@ impl FaceLinks {
             .flat_map(|from| ends.iter().map(move |to| [from[1], to[0]]));
         let time = |link| times.across(link, heights.over(link).min(home_mm.z));
         Self {
-            faces: faces_mm.len(),
+            face_count: faces_mm.len(),
             times_s: pairs.map(time).collect(),
         }
     }
 
     const fn home(&self) -> usize {
-        self.faces
+        self.face_count
     }
 
     fn time_s(&self, from: usize, to: usize) -> f64 {
-        self.times_s[from * (self.faces + 1) + to]
+        self.times_s[from * (self.face_count + 1) + to]
     }
 
-    /// The time of all links of an order, from home and back, s.
+    /// The time of the links from home through the faces in this order and back home, s.
     pub(crate) fn sum_s(&self, order: &[usize]) -> f64 {
         self.way_s(self.home(), order, self.home())
     }
 
-    /// The time of the links from a face through others to a third, s.
+    /// The time of the links from one face through others to a last one, s.
     fn way_s(&self, from: usize, through: &[usize], to: usize) -> f64 {
         let before = std::iter::once(from).chain(through.iter().copied());
         let behind = through.iter().copied().chain([to]);
@@ -64,7 +65,7 @@ impl FaceLinks {
     /// The order of all faces.
     pub(crate) fn order(&self) -> Vec<usize> {
         let mut order = self.nearest();
-        for _ in 0..ROUNDS {
+        for _ in 0..ROUNDS_MAX {
             if !self.improve(&mut order) {
                 break;
             }
@@ -72,9 +73,9 @@ impl FaceLinks {
         order
     }
 
-    /// From home always to the nearest start.
+    /// Nearest neighbour: from home, always the face with the shortest link to its start.
     fn nearest(&self) -> Vec<usize> {
-        let mut left: Vec<usize> = (0..self.faces).collect();
+        let mut left: Vec<usize> = (0..self.face_count).collect();
         let mut order = Vec::with_capacity(left.len());
         let mut at = self.home();
         let nearest = |at: usize, left: &[usize]| {
@@ -88,14 +89,14 @@ impl FaceLinks {
         order
     }
 
-    /// One round: every run of faces turned round (2-opt), and a few moved elsewhere (or-opt). Returns whether anything was changed.
+    /// One round: reverses stretches of the order (2-opt) and moves up to [`MOVED_MAX`] faces elsewhere (or-opt) where that saves time. Returns whether the order changed.
     fn improve(&self, order: &mut [usize]) -> bool {
         let mut is_better = false;
         for from in 0..order.len() {
             for to in from + 2..=order.len() {
-                is_better |= self.turn_round(order, from, to);
+                is_better |= self.replace(order, from, to, <[usize]>::reverse);
             }
-            for count in 1..=MOVED.min(order.len() - from) {
+            for count in 1..=MOVED_MAX.min(order.len() - from) {
                 for place in 0..=order.len() - count {
                     is_better |= self.shift(order, from, count, place);
                 }
@@ -104,13 +105,9 @@ impl FaceLinks {
         is_better
     }
 
-    fn turn_round(&self, order: &mut [usize], from: usize, to: usize) -> bool {
-        self.replace(order, from, to, <[usize]>::reverse)
-    }
-
-    /// Moves some faces to another place of the order without them.
+    /// Moves `count` faces from index `from` to index `place` where that saves time.
     fn shift(&self, order: &mut [usize], from: usize, count: usize, place: usize) -> bool {
-        // Only what is between the old place and the new one changes.
+        // The order changes between the old place and the new one only.
         let (low, high) = (from.min(place), from.max(place) + count);
         self.replace(order, low, high, |moved| {
             if from < place {
@@ -121,7 +118,7 @@ impl FaceLinks {
         })
     }
 
-    /// Changes a part of an order where that saves time.
+    /// Applies `change` to the faces `from..to` of the order where that saves time. Returns whether it did.
     fn replace(
         &self,
         order: &mut [usize],
@@ -134,7 +131,7 @@ impl FaceLinks {
         let now = &mut order[from..to];
         let mut new = now.to_vec();
         change(&mut new);
-        let saves = self.way_s(before, &new, behind) + SAVED_S < self.way_s(before, now, behind);
+        let saves = self.way_s(before, &new, behind) + SAVED_MIN_S < self.way_s(before, now, behind);
         if saves {
             now.copy_from_slice(&new);
         }
@@ -182,7 +179,7 @@ mod tests {
         (0..faces.len()).flat_map(first).collect()
     }
 
-    /// Faces of a row, each as long as it is apart from the next, in the file from both ends to the middle.
+    /// A row of faces 5 mm long and 5 mm apart, numbered from both ends to the middle.
     #[test]
     fn a_row_is_machined_from_one_end_to_the_other() {
         let face = |x: f64| [DVec3::new(x, 0.0, 0.0), DVec3::new(x + 5.0, 0.0, 0.0)];

@@ -8,23 +8,21 @@ use job::{AxisLimits, FaceParameters, FaceReach};
 use part::{HeightMap, Times, Tool};
 use rayon::prelude::*;
 
-use crate::face::{FacePlan, REACH_SIDE};
+use crate::face::{FacePlan, REACH_PLACES};
 use crate::order::{FaceLinks, FaceOrder};
 use crate::setup::{PartSetup, UpSide};
 
-/// How far the surface of a face goes on beyond it, in step-overs: as for a job.
-const STEP_OVERS_AROUND: f64 = job_file::STEP_OVERS_AROUND;
-/// Places along each parameter of a face by which the six sides of a part are compared.
-const SIDE_LOOKS: usize = 16;
+/// Places along each parameter of a face at which its reach is sampled to compare the six sides of a part.
+const UP_SIDE_PLACES: usize = 16;
 
 /// Tool and cut of all faces.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CutOptions {
     /// Ball radius, mm.
     pub radius_mm: f64,
-    /// Scallop height limit, mm; `None`: that of a job with this ball.
+    /// Scallop height limit, mm; `None`: the default for this ball.
     pub scallop_mm: Option<f64>,
-    /// Feed along the surface, mm/min; `None`: that of a job.
+    /// Feed along the surface, mm/min; `None`: the default.
     pub feed_mm_min: Option<f64>,
     /// Surface parameter along a pass, as in job files; `None`: chosen for each face.
     pub along: Option<String>,
@@ -52,13 +50,14 @@ impl CutOptions {
         Tool::new(self.radius_mm, &job::ToolBody::default())
     }
 
-    /// How a face becomes a surface with these parameters.
-    fn of_surface(&self, parameters: FaceParameters) -> Options {
+    /// Options for making the surface of a face with these parameters.
+    fn surface_options(&self, parameters: FaceParameters) -> Options {
         Options {
             tolerance_mm: self.tolerance_mm,
             untrimmed: false,
             parameters,
-            around_mm: STEP_OVERS_AROUND * job::plane_step_over_mm(self.radius_mm, self.scallop_mm()),
+            around_mm: job_file::STEP_OVERS_AROUND
+                * job::plane_step_over_mm(self.radius_mm, self.scallop_mm()),
         }
     }
 }
@@ -81,15 +80,15 @@ pub struct Planner<'a> {
     pub(crate) file: &'a str,
     pub(crate) model: &'a Arc<Model>,
     pub(crate) cut: &'a CutOptions,
-    /// The faces, and their surfaces by their edges where they have four.
+    /// The faces, each with its surface; a face of four edges has its parameters between them.
     faces: Vec<(&'a Face, FaceSurface)>,
 }
 
 impl<'a> Planner<'a> {
-    /// For these faces of a file's model; makes their surfaces.
+    /// A planner for these faces of the model of `file`. Makes their surfaces, on all cores.
     #[must_use]
     pub fn new(file: &'a str, model: &'a Arc<Model>, faces: &[&'a Face], cut: &'a CutOptions) -> Self {
-        let options = cut.of_surface(FaceParameters::Edges);
+        let options = cut.surface_options(FaceParameters::Edges);
         let surfaces = faces
             .par_iter()
             .map(|face| (*face, machinable_once(file, model, face.number, &options)));
@@ -101,13 +100,13 @@ impl<'a> Planner<'a> {
         }
     }
 
-    /// The part with this side up.
+    /// The setup with this side up.
     #[must_use]
     pub fn setup(&self, side: UpSide) -> PartSetup {
         PartSetup::new(side, self.model, self.cut.tool(), self.cut.scallop_mm())
     }
 
-    /// The part with the side up of which the tool reaches most; of equal ones the first.
+    /// The setup in which the tool reaches the largest area; of equal ones the first of [`UpSide::ALL`].
     #[must_use]
     pub fn best_setup(&self) -> PartSetup {
         let tried = UpSide::ALL.map(|side| {
@@ -117,7 +116,7 @@ impl<'a> Planner<'a> {
                 .par_iter()
                 .filter_map(|(face, surface)| Some((face, surface.as_ref().ok()?)));
             let reached: f64 = known
-                .map(|(face, surface)| setup.reach(face, surface, SIDE_LOOKS).reachable_mm2)
+                .map(|(face, surface)| setup.reach(face, surface, UP_SIDE_PLACES).reachable_mm2)
                 .sum();
             (reached, side)
         });
@@ -128,12 +127,12 @@ impl<'a> Planner<'a> {
         self.setup(best.1)
     }
 
-    /// What the tool reaches of each face, in the order of the faces; why it is not known where a face has no surface. `done` is called after each, from several threads.
+    /// The reach of each face, in the order of the faces; an error for a face without a surface. `done` is called after each face, from several threads.
     #[must_use]
     pub fn reaches(&self, setup: &PartSetup, done: impl Fn() + Sync) -> Vec<Result<FaceReach, CadError>> {
         let found = self.faces.par_iter().map(|(face, surface)| {
             let reach = match surface {
-                Ok(surface) => Ok(setup.reach(face, surface, REACH_SIDE)),
+                Ok(surface) => Ok(setup.reach(face, surface, REACH_PLACES)),
                 Err(error) => Err(error.clone()),
             };
             done();
@@ -142,7 +141,7 @@ impl<'a> Planner<'a> {
         found.collect()
     }
 
-    /// The plan of each face, in the order of the faces. `done` is called after each, from several threads.
+    /// The plan of each face, in the order of the faces. `done` is called after each face, from several threads.
     #[must_use]
     pub fn plans(&self, setup: &PartSetup, folder: &JobFolder, done: impl Fn() + Sync) -> Vec<FacePlan> {
         let plans = self.faces.par_iter().map(|(face, surface)| {
@@ -153,12 +152,12 @@ impl<'a> Planner<'a> {
         plans.collect()
     }
 
-    /// The better plan of those with each surface that a face can have.
+    /// The better of a face's plans: with parameters between its edges, and with those of its own surface.
     fn plan(&self, setup: &PartSetup, folder: &JobFolder, face: &Face, by_edges: &FaceSurface) -> FacePlan {
         let mut plan = self.plan_with(setup, folder, face, by_edges);
         // Lines between edges that are not parallel spread: the surface's own parameters may take less time.
         if by_edges.as_ref().is_ok_and(|surface| surface.by_edges) {
-            let options = self.cut.of_surface(FaceParameters::Surface);
+            let options = self.cut.surface_options(FaceParameters::Surface);
             let own = machinable_once(self.file, self.model, face.number, &options);
             let other = self.plan_with(setup, folder, face, &own);
             if other.is_better_than(&plan) {

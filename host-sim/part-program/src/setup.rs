@@ -1,4 +1,4 @@
-//! How a part lies on the machine: the side that looks up, and where it stands; what the tool reaches of a face there.
+//! How a part lies on the machine: which side looks up, its translation, and the reach of the tool over each face.
 
 use std::sync::Arc;
 
@@ -8,30 +8,30 @@ use job::{FaceReach, SurfaceSpec};
 use part::{Part, Request, Tool, placed_part};
 use patches::placement::Rotation;
 
-/// Default of the machine's range, mm: a part that reaches farther from the origin is moved to it.
+/// A part that reaches farther from the origin than this, mm, is moved there: the machine's range is 2147 mm either way.
 const RANGE_MM: f64 = 2000.0;
-/// Places along each parameter at which the two sides of a face that bounds no solid are compared, and by which a face that is not reached is found.
-pub(crate) const LOOK_SIDE: usize = 12;
+/// Places along each parameter of a face for a coarse look at its reach: which side of a face that bounds no solid is reached more, and whether any of it is reached.
+pub(crate) const COARSE_PLACES: usize = 12;
 
 /// The side of the part that looks up on the machine, in the axes of the file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum UpSide {
     /// The file's +z.
     PlusZ,
-    /// Its -z.
+    /// The file's -z.
     MinusZ,
-    /// Its +x.
+    /// The file's +x.
     PlusX,
-    /// Its -x.
+    /// The file's -x.
     MinusX,
-    /// Its +y.
+    /// The file's +y.
     PlusY,
-    /// Its -y.
+    /// The file's -y.
     MinusY,
 }
 
 impl UpSide {
-    /// All of them, in the order in which they are tried.
+    /// All sides, in the order in which [`crate::Planner::best_setup`] tries them.
     pub const ALL: [Self; 6] = [
         Self::PlusZ,
         Self::MinusZ,
@@ -41,7 +41,7 @@ impl UpSide {
         Self::MinusY,
     ];
 
-    /// Rotations about x, y and z that turn it up, degrees.
+    /// Rotations about x, then y, then z that turn this side up, degrees.
     #[must_use]
     pub const fn rotate_deg(self) -> [f64; 3] {
         match self {
@@ -54,7 +54,7 @@ impl UpSide {
         }
     }
 
-    /// Its name: sign and axis.
+    /// Name of the side: sign and axis.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -74,7 +74,7 @@ pub struct PartSetup {
     pub side: UpSide,
     /// Translation of the part after its rotation, mm.
     pub translate_mm: [f64; 3],
-    /// From the file to the machine.
+    /// Rotation and translation together: from the file's coordinates to the machine's.
     pub placement: Placement,
     /// The part on the machine.
     pub part: Arc<Part>,
@@ -85,7 +85,7 @@ pub struct PartSetup {
 }
 
 impl PartSetup {
-    /// With this side up, where the file places the part; a part that reaches more than 2 m from the origin is centred on it.
+    /// A setup with this side up, at the file's origin; a part that reaches more than 2 m from the origin is centred there.
     #[must_use]
     pub fn new(side: UpSide, model: &Arc<Model>, tool: Tool, scallop_mm: f64) -> Self {
         let linear = Rotation::of_degrees(side.rotate_deg()).0;
@@ -110,7 +110,7 @@ impl PartSetup {
         setup
     }
 
-    /// Where the ball's centre stands before and after the faces, mm: above the middle of the part, as high as links go at most.
+    /// Position of the ball's centre before the first face and after the last one, mm: above the middle of the part, at the greatest height of a link.
     #[must_use]
     pub fn home_mm(&self) -> DVec3 {
         let block = self.part.block();
@@ -118,8 +118,8 @@ impl PartSetup {
         middle.with_z(block.high.z + self.tool.radius + job::CLEARANCE_DEFAULT_MM)
     }
 
-    /// Calls `ask` with the request for the region of a face that has this surface; `sign`: of the tool's side on `S_u x S_v`.
-    pub(crate) fn request<T>(
+    /// Calls `ask` with the request for the region of a face with this surface, which borrows from this call. `sign`: of the tool's side on `S_u x S_v`.
+    pub(crate) fn with_request<T>(
         &self,
         face: &Face,
         sign: f64,
@@ -130,7 +130,7 @@ impl PartSetup {
         let spec = surface.spec();
         let [[u0, u1], [v0, v1]] = spec.domain();
         let whole = vec![vec![[u0, v0], [u1, v0], [u1, v1], [u0, v1]]];
-        // In the coordinates of the file the surface is placed by its poles.
+        // `surface` is in the file's coordinates.
         let placed_surface = oracle::Surface::new(&moved(&spec, &self.placement));
         let request = Request {
             surface: &placed_surface,
@@ -147,14 +147,13 @@ impl PartSetup {
         ask(&request)
     }
 
-    /// Sign of the machined side on `S_u x S_v`: out of the material. For a face that bounds no solid the file does not name that side: the side of which more is
-    /// reached.
+    /// Sign of the machined side on `S_u x S_v`: out of the material. For a face that bounds no solid the file does not tell it; then the side with the larger reach.
     pub(crate) fn sign(&self, face: &Face, surface: &MachinableFace) -> f64 {
         if face.solid {
             return face.sense;
         }
         let reached = |sign| {
-            self.request(face, sign, surface, |request| request.reach(LOOK_SIDE))
+            self.with_request(face, sign, surface, |request| request.reach(COARSE_PLACES))
                 .reachable_mm2
         };
         if reached(-face.sense) > reached(face.sense) {
@@ -164,10 +163,10 @@ impl PartSetup {
         }
     }
 
-    /// What the tool reaches of a face that has this surface, by `side` times `side` places.
-    pub(crate) fn reach(&self, face: &Face, surface: &MachinableFace, side: usize) -> FaceReach {
+    /// The reach of the tool over a face with this surface, sampled at `places` along each parameter.
+    pub(crate) fn reach(&self, face: &Face, surface: &MachinableFace, places: usize) -> FaceReach {
         let sign = self.sign(face, surface);
-        let found = self.request(face, sign, surface, |request| request.reach(side));
+        let found = self.with_request(face, sign, surface, |request| request.reach(places));
         FaceReach {
             area_mm2: found.area_mm2,
             reachable_mm2: found.reachable_mm2,
@@ -181,7 +180,7 @@ impl PartSetup {
     }
 }
 
-/// A surface by its poles, transformed.
+/// A B-spline with its poles transformed; another surface as it is.
 fn moved(spec: &SurfaceSpec, by: &Placement) -> SurfaceSpec {
     let SurfaceSpec::Nurbs(nurbs) = spec else {
         return spec.clone();

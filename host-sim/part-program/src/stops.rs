@@ -1,6 +1,7 @@
-//! The runs of the faces of a job of many, one after the other: each ends straight above the start of the next one, as low as the part allows, and the next one begins there.
+//! Where the runs of the faces of a job of many begin and end: each run ends straight above the start of the next one, as low as the part allows, and the next one begins
+//! there.
 //!
-//! Where something else than the part may be in the way, or the part is not known, each run begins and ends at the job's home.
+//! Where an obstacle other than the part is possible, or no part is known, a run begins and ends at the job's home.
 
 use glam::DVec3;
 use job::Job;
@@ -11,12 +12,12 @@ use rayon::prelude::*;
 
 use crate::links::{only_part_between, passes};
 
-/// Where the run of a face begins and ends. The default: at its job's home.
+/// Where the run of a face begins and ends. By default both are its job's home.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Stop {
-    /// Its home, nm, if not the job's.
+    /// The ball's centre before the run, nm; `None`: the job's home.
     home_nm: Option<[i32; 3]>,
-    /// Where it ends, if not at its home, and at which height it goes there, nm.
+    /// The ball's centre after the run, and the height of the way to that place, nm; `None`: as before the run.
     end_nm: Option<([i32; 3], i32)>,
 }
 
@@ -36,7 +37,7 @@ impl Stop {
     }
 }
 
-/// A face whose run may begin or end beside its neighbours', and the places that decide where.
+/// A face whose run may begin above the end of the run before, and the places that decide where.
 struct Visit {
     job: Job,
     home_nm: [i32; 3],
@@ -47,18 +48,16 @@ struct Visit {
 
 impl Visit {
     /// `None` where the run has to begin and end at home.
-    fn new((job, prepared): (Job, Prepared)) -> Result<Option<Self>, FaceError> {
-        let Some(axes) = prepared.header.axes.filter(|_| only_part_between(&job)) else {
-            return Ok(None);
-        };
-        let passes = passes(&job, &prepared)?;
-        let ends = passes.first().zip(passes.last());
-        Ok(ends.map(|([start, _], [_, end])| Self {
+    fn new((job, prepared): (Job, Prepared)) -> Option<Self> {
+        let axes = prepared.header.axes.filter(|_| only_part_between(&job))?;
+        let passes = passes(&job, &prepared);
+        let ([start, _], [_, end]) = passes.first().zip(passes.last())?;
+        Some(Self {
             home_nm: axes.home_nm,
             safe_nm: axes.safe_z_nm,
             ends_nm: [*start, *end],
             job,
-        }))
+        })
     }
 
     /// Where the run ends and the next begins: straight above the start of the next.
@@ -72,7 +71,8 @@ impl Visit {
     }
 }
 
-/// Where the runs of the faces begin and end, in this order. `load` reads and prepares a face; the runs before and after one that it returns `None` for are at home.
+/// Where the runs of the faces begin and end, in the order of `faces`. `load` reads and prepares the job of a face. Where it returns `None`, the run before that face ends at
+/// home, and the run after it begins there.
 ///
 /// # Errors
 /// The part's file cannot be read.
@@ -83,8 +83,10 @@ pub fn stops<F: Sync>(
     if faces.len() < 2 {
         return Ok(vec![Stop::default(); faces.len()]);
     }
-    let visit = |face: &F| load(face).map_or(Ok(None), Visit::new);
-    let visits: Vec<Option<Visit>> = faces.par_iter().map(visit).collect::<Result<_, _>>()?;
+    let visits: Vec<Option<Visit>> = faces
+        .par_iter()
+        .map(|face| load(face).and_then(Visit::new))
+        .collect();
     let between = visits.par_windows(2).map(|pair| match pair {
         [Some(one), Some(next)] => one.stop_before(next).map(Some),
         _ => Ok(None),

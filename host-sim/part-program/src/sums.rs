@@ -2,23 +2,23 @@
 
 use crate::face::FacePlan;
 
-/// Areas of all faces, mm2.
+/// Sums of the areas of all faces whose reach is known, mm2.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sums {
     /// Area of the faces.
     pub area_mm2: f64,
-    /// What the tool reaches.
+    /// Area that the tool reaches.
     pub reachable_mm2: f64,
-    /// What lies in the regions of jobs.
+    /// Reachable area within the regions of jobs.
     pub region_mm2: f64,
-    /// What the tool does not reach, by the name of the rule.
+    /// Area that the tool does not reach, by the name of the rule that it breaks first.
     pub unreachable_mm2: Vec<(String, f64)>,
     /// Number of faces whose reach is not known.
     pub unknown: usize,
 }
 
 impl Sums {
-    /// Over these faces.
+    /// The sums over these faces.
     #[must_use]
     pub fn of(plans: &[FacePlan]) -> Self {
         let mut sums = Self::default();
@@ -41,8 +41,8 @@ impl Sums {
     }
 }
 
-/// A share in percent; 0 of nothing.
+/// A part as a percentage of a whole; 0 of an empty whole.
 #[must_use]
-pub fn percent(share: f64, of: f64) -> f64 {
-    if of > 0.0 { 100.0 * share / of } else { 0.0 }
+pub fn percent(part: f64, whole: f64) -> f64 {
+    if whole > 0.0 { 100.0 * part / whole } else { 0.0 }
 }

@@ -10,7 +10,8 @@ use crate::setup::PartSetup;
 use crate::sums::percent;
 
 impl Planner<'_> {
-    /// One job file with all faces that have a job: the keys that they have in common, then a section for each face in the order of machining.
+    /// One job file with all faces that have a job: the common keys, then a section for each face in the order of machining. `output`: the path of that file, for its
+    /// first comment.
     #[must_use]
     pub fn text(
         &self,
@@ -41,7 +42,7 @@ impl Planner<'_> {
         out
     }
 
-    /// The keys that all faces have in common.
+    /// The keys that all faces have in common, with a first comment.
     fn head(&self, setup: &PartSetup, folder: &JobFolder, output: &Path, faces: &[&FacePlan]) -> String {
         let path = folder.source.as_deref().unwrap_or_default();
         let radius_mm = self.cut.radius_mm;

@@ -333,17 +333,18 @@ fn cache_file(job: &Job, source: &CadSource) -> Option<PathBuf> {
     Some(folder.join(CACHE).join(format!("region-{name_of:016x}.json")))
 }
 
-/// A value that is kept beside a job, by a digest of all that it depends on: `keys`, and the bytes of a file. A job without a folder, or without a face of a CAD file, keeps nothing.
+/// A value from the cache beside the job, else from `make`. Its file is named by `what` and a digest of all that it depends on: `keys`, and the bytes of `file`.
+/// A job without a folder, or without a face of a CAD file, has no cache.
 ///
 /// # Errors
 /// Those of `make`.
-pub(crate) fn cached<T: Serialize + DeserializeOwned>(
+pub(crate) fn cached<T: Serialize + DeserializeOwned, E>(
     job: &Job,
     what: &str,
     keys: &[&[u8]],
     file: Option<&Path>,
-    make: impl FnOnce() -> Result<T, FaceError>,
-) -> Result<T, FaceError> {
+    make: impl FnOnce() -> Result<T, E>,
+) -> Result<T, E> {
     let name = Path::new(job.origin.name());
     let folder = name.parent().filter(|folder| {
         let is_named = name.file_name().is_some() && job.origin.cad().is_some();

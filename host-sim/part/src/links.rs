@@ -6,6 +6,8 @@
 //! Past a wall that bulges towards the tool neither the straight way is clear nor any that is not above the wall. There a link goes around: straight to a place beside the middle of both
 //! ends and somewhat above, and straight from there, at the feed. Of all ways that are clear the one that takes least time is taken.
 
+use std::convert::Infallible;
+
 use glam::DVec3;
 use job::{AxisLimits, Job};
 use oracle::Surface;
@@ -60,16 +62,10 @@ pub enum Way {
     Across(f64),
 }
 
-/// The ball's centre at the start and at the end of each pass of a job, nm; `make` is called where they are not kept beside the job, by a digest of `key`.
-///
-/// # Errors
-/// None: `make` has none.
-pub fn passes(
-    job: &Job,
-    key: &[u8],
-    make: impl FnOnce() -> Vec<[[i32; 3]; 2]>,
-) -> Result<Vec<[[i32; 3]; 2]>, FaceError> {
-    cached(job, "passes", &[key], None, || Ok(make()))
+/// The ball's centre at the start and at the end of each pass of a job, nm: from the cache beside the job, by a digest of `key`, else from `make`.
+pub fn passes(job: &Job, key: &[u8], make: impl FnOnce() -> Vec<[[i32; 3]; 2]>) -> Vec<[[i32; 3]; 2]> {
+    let Ok(passes) = cached(job, "passes", &[key], None, || Ok::<_, Infallible>(make()));
+    passes
 }
 
 /// The least height at which the tool of a job crosses the part between two places of the ball's centre, mm, at most the safe height; the safe height where no part is known.
@@ -84,8 +80,8 @@ pub fn crossing(job: &Job, safe_mm: f64, ends: [DVec3; 2]) -> Result<f64, FaceEr
     Ok(Crossings::new(&part, &Tool::of(job), of.tolerance_mm, safe_mm).height(ends))
 }
 
-/// The ways of the links of a job with these ends, the ball's centre in mm; `ends` is called where they are not kept beside the job, by a digest of all that they
-/// depend on: of `key` among it. No height is above the safe height.
+/// The ways of the links of a job: from the cache beside the job, by a digest of `key`, the tool, the limits and the part's file, else computed from `ends`, the ball's
+/// centre at both ends of each link, mm. No height is above the safe height.
 ///
 /// # Errors
 /// The part's file cannot be read.
