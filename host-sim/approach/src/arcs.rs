@@ -205,7 +205,8 @@ impl Arcs {
             }
         });
         let holds = |k: usize, nodes: &[Node]| {
-            // Between the nodes the path may be farther off than at them: by 1/n^2 of a parabola, and by twice that of what is bent more in its middle.
+            // Between the nodes the deviation may exceed that at the nodes: on a parabola by the share 1/n^2, on a path with a sharper bend in its middle by up to twice
+            // that share.
             let intervals = nodes.len().max(2) as f64;
             let path_mm = self.path_mm * (1.0 - 2.0 / (intervals * intervals));
             let begin = if k == 0 { 0.0 } else { contact };

@@ -8,8 +8,9 @@ use glam::DVec3;
 use job::Along;
 use oracle::{OffsetPoint, OracleError};
 
-/// Parts of a chord between whose ends its error is evaluated; of a chord of a curved pass, which may bend within a short part of it.
+/// Parts of a chord at whose ends its error is evaluated.
 const PROBES: u32 = 12;
+/// [`PROBES`] of a chord of a curved pass, which may bend within a short part of the chord.
 const PROBES_CURVED: u32 = 32;
 /// Largest number of halvings of a step.
 const HALVINGS: u32 = 40;

@@ -4,13 +4,15 @@ use super::PassPath;
 use glam::DVec3;
 use oracle::{OffsetPoint, OracleError};
 
-/// Points per smooth span of the surface, and least number of points per pass.
+/// Points per smooth span of the surface.
 const PER_SPAN: usize = 48;
+/// Least number of points per pass.
 const LEAST: usize = 384;
-/// Greatest change of the speed ratio from point to point, as a share, and cosine of the greatest turn of the centre's path, 0.05 rad: where it is more, points are added
-/// in the middle, at most so many times.
+/// Greatest change of the speed ratio from point to point, as a share; an interval with a larger change is halved.
 const RATIO_CHANGE: f64 = 0.01;
+/// Cosine of the greatest turn of the centre's path from point to point, 0.05 rad; an interval with a larger turn is halved.
 const TURN_COSINE: f64 = 0.998_75;
+/// Largest number of successive halvings of an interval.
 const HALVINGS: u32 = 6;
 /// Two-point Gauss-Legendre rule on [0, 1]: 0.5 -+ 1/(2 sqrt 3). At this density the relative error is below 1e-9.
 pub(super) const GAUSS: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];

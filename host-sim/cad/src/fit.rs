@@ -20,12 +20,13 @@ const LINES: usize = 17;
 const PLACES: usize = 6;
 /// Points per side of a patch at which the deviation of the fit is measured.
 const DENSE: usize = 9;
-/// Those of a fit that is refused, to tell of how many patches one would be: some of the same points.
+/// Points per side of a patch, a subset of the [`DENSE`] ones, for a fit of more patches than the store holds, whose number is reported only.
 const SPARSE: usize = 3;
 /// Share of the tolerance for each direction; reduced if both together exceed the tolerance.
 const SHARE: f64 = 0.9;
-/// Greatest jump of a first derivative, as a share of it, and of a second one over the range, as a share of the first, that is rounding.
+/// Greatest jump of a first derivative that counts as rounding, as a share of the derivative.
 const FIRST_JUMP: f64 = 1e-7;
+/// Greatest jump of a second derivative times the range that counts as rounding, as a share of the first derivative.
 const SECOND_JUMP: f64 = 1e-6;
 /// Distance from a joint, as a share of the range, at which the derivatives of its sides are taken.
 const BESIDE: f64 = 1e-9;

@@ -13,8 +13,9 @@ const RADII_MM: [f64; 13] = [0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0,
 const FIT: f64 = 0.8;
 /// Default feed, mm/min.
 pub const FEED_MM_MIN: f64 = 1200.0;
-/// Default scallop height, mm, and the largest as a share of the ball's radius.
+/// Default scallop height, mm.
 const SCALLOP_MM: f64 = 0.01;
+/// Largest default scallop height, as a share of the ball's radius.
 const SCALLOP_SHARE: f64 = 0.1;
 /// Least z of the mean normal of a surface that faces up.
 const UP: f64 = 0.1;

@@ -30,9 +30,11 @@ use crate::{
     world::{NEVER, World},
 };
 
-/// Channel of TIM1's requests, and their streams (RM0090, table 43).
+/// DMA2 channel of TIM1's requests (RM0090, table 43).
 const TIM1_CHANNEL: u32 = 6;
+/// DMA2 stream of TIM1's update request (RM0090, table 43).
 const TIM1_UPDATE_STREAM: usize = 5;
+/// DMA2 stream of TIM1's compare request (RM0090, table 43).
 const TIM1_COMPARE_STREAM: usize = 1;
 
 /// Interval between polls for bytes of the host, seconds: random, so that bytes arrive in any phase of a period.

@@ -1,6 +1,6 @@
-//! What a boot loader leaves behind when it calls the image: the chip as a loader has it that has read a card. The loader itself is not executed.
+//! The state in which a boot loader that has read a card leaves the chip when it starts the image. The loader itself is not executed.
 //!
-//! A watchdog is not among it: nothing could end it.
+//! The watchdog is not running: no image could stop it.
 
 use boards::FLASH_BEGIN;
 

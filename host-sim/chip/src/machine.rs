@@ -1,4 +1,4 @@
-//! A machine around the board: carriages that follow the pulses, limit switches, a probe plate, and what can be wrong with them.
+//! A machine around the board: carriages that follow the pulses, limit switches and a probe plate, with their possible defects.
 
 use boards::{Axis, Board, Level, Line, Role};
 

@@ -58,7 +58,7 @@ const SRAM_FILL: u8 = 0xa5;
 /// Contents of erased flash.
 const FLASH_FILL: u8 = 0xff;
 
-/// What a boot loader's flash is filled with here: no vector of it can be taken.
+/// Fill byte of the flash of a boot loader: an exception that took a vector from there would fail.
 const LOADER_FILL: u8 = 0xde;
 
 /// Writes an image to flash: an ELF file, or the flat file that a board's boot loader takes from a card. Returns its board and its first address.
@@ -100,7 +100,7 @@ fn load(data: &[u8], flash: Memory) -> Result<(&'static Board, u32), String> {
     Ok((board, begin))
 }
 
-/// The same for a flat file, which lies where its board's loader begins it.
+/// Writes a flat file to flash, at the address at which its board's loader starts it. Returns its board and that address.
 fn load_flat(data: &[u8], flash: Memory) -> Result<(&'static Board, u32), String> {
     let is_in_it = |board: &&Board| data.windows(MARK_BYTES).any(|bytes| bytes == board.mark());
     let board = BOARDS

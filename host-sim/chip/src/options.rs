@@ -76,7 +76,7 @@ pub(crate) struct Options {
 #[derive(Clone, Debug, Default)]
 struct End(Arc<AtomicBool>);
 
-/// Lines of standard input that are not looked at yet.
+/// Lines of standard input that are not executed yet.
 #[derive(Clone, Debug, Default)]
 struct Typed(Arc<Mutex<Vec<String>>>);
 

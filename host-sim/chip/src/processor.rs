@@ -12,8 +12,9 @@ use crate::{
 
 /// Cycles of an entry and of an exit.
 const EXCEPTION_CYCLES: u64 = 12;
-/// Bytes of a frame, with and without floating-point registers.
+/// Bytes of an exception frame without floating-point registers.
 const FRAME: u32 = 0x20;
+/// Bytes of an exception frame with floating-point registers.
 const FLOAT_FRAME: u32 = 0x68;
 const EXC_RETURN: u32 = 0xffff_ff00;
 const WFI: u16 = 0xbf30;

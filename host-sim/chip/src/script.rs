@@ -7,7 +7,7 @@ use boards::{Axis, Board, Line, Role};
 pub(crate) enum Event {
     /// An input becomes active or inactive.
     Input { role: Role, is_active: bool },
-    /// A machine's spindle is held below its speed, or let go.
+    /// A machine's spindle is held below its speed (true), or runs up again (false).
     Stall(bool),
     /// The processor stops executing.
     Hang,
@@ -15,19 +15,18 @@ pub(crate) enum Event {
     Fault,
     /// The supply falls below the brown-out threshold and recovers immediately.
     BrownOut,
-    /// The supply falls: the drives let go, after `lag_s` the voltage detector's level is reached, and `holds_s` later the chip is without supply, which then
-    /// comes back.
+    /// The supply falls and returns: the drives lose their power, after `lag_s` the supply reaches the voltage detector's level, and `holds_s` later the chip has no supply.
     Power { lag_s: f64, holds_s: f64 },
 }
 
-/// Time of an event, seconds.
+/// Time of an event, seconds or pulses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum When {
-    /// After power-on.
+    /// This long after power-on.
     Start(f64),
-    /// After the first step pulse.
+    /// This long after the first step pulse.
     Motion(f64),
-    /// With this number of step pulses of a machine's carriages.
+    /// At the step pulse of a machine's carriages with this number.
     Pulses(u64),
 }
 

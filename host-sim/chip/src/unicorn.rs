@@ -265,12 +265,15 @@ unsafe extern "C" fn on_write<H: Surroundings, const BASE: u32>(
         .write(BASE + offset as u32, bytes, value as u32);
 }
 
-/// The sectors of flash that can be written, and the system memory with the chip's size.
+/// Address of the flash sectors that the model can write.
 const SETTINGS: u32 = crate::part::flash::SETTINGS;
+/// Address of the system memory, which holds the size of the chip's flash.
 const SYSTEM: u32 = 0x1fff_0000;
-/// The peripherals, their bit-band alias, and the processor's own.
+/// Address of the peripherals.
 const PERIPHERALS: u32 = 0x4000_0000;
+/// Address of the peripherals' bit-band alias.
 const BIT_BAND: u32 = 0x4200_0000;
+/// Address of the processor's own peripherals.
 const PRIVATE: u32 = 0xe000_0000;
 
 impl<H: Surroundings> Engine<H> {

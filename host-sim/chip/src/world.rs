@@ -12,7 +12,7 @@ const KEPT: usize = 200;
 pub(crate) struct World {
     /// Now, in cycles.
     pub(crate) now: u64,
-    /// Begin and end of the last operation of the flash, cycles: the program stands, which is in the same flash.
+    /// Begin and end of the last operation of the flash, cycles: the program, which is in the same flash, is stopped meanwhile.
     pub(crate) flash_busy: [u64; 2],
     hclk_hz: f64,
     /// Start of the present frequency, cycles and seconds.
@@ -21,9 +21,9 @@ pub(crate) struct World {
     pub(crate) complaints: Vec<String>,
     /// Number of complaints.
     pub(crate) complained: u64,
-    /// What happened.
+    /// Log of the models.
     pub(crate) notes: Vec<String>,
-    /// What the script did, and resets, with their cycles.
+    /// Scripted events and resets, each with its time in cycles.
     pub(crate) events: Vec<(u64, String)>,
     /// Notes go to standard error as they come.
     verbose: bool,

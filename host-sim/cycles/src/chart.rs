@@ -12,8 +12,9 @@ use super::PERIOD_CYCLES;
 use super::figures::{Histogram, Model, histogram, tick_cycles};
 use super::measure::Ticks;
 
-/// Size of the chart, and height of the bars, pixels.
+/// Size of the chart, pixels.
 const SIZE: (u32, u32) = (1100, 900);
+/// Height of the part with the bars, pixels.
 const BARS_HEIGHT: u32 = 420;
 
 /// Least share of the ticks on the axis.

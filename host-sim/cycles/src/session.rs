@@ -23,13 +23,16 @@ use machine::remote::{RemoteError, Session, drive};
 /// Number of a run's costliest ticks that are repeated with coincident events.
 const REPEATED_TICKS: usize = 2;
 
-/// Ticks of one wait for a stop, and the number of waits: ten minutes of machine time.
+/// Ticks of one wait for a stop.
 const STOP_TICKS: u32 = 10_000;
+/// Largest number of waits for a stop: ten minutes of machine time together.
 const STOP_WAITS: u32 = 60;
 
-/// Ticks with random operator commands, the most between two commands, and the seed of the commands.
+/// Ticks with random operator commands.
 const OPERATOR_TICKS: u32 = 4500;
+/// Largest number of ticks between two random commands.
 const PAUSE_MAX: u32 = 24;
+/// Seed of the random commands.
 const OPERATOR_SEED: u64 = 7;
 
 /// Ticks without commands after a start: the look-ahead of the first pass.

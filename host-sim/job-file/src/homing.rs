@@ -15,15 +15,17 @@ const KEYS: [&str; 7] = [
     "survives_off",
 ];
 
-/// In the order: no axis.
+/// Entry of the homing order without an axis.
 const NO_AXIS: u8 = 3;
 
-/// What three speeds or distances are.
+/// Expected value of a key with three speeds or distances, for messages.
 const ABOVE_0: &str = "three numbers above 0, one each for x, y and z, e.g. [20, 20, 10]";
 
-/// Default speed of the approach, mm/s, and of the distance from the switch, mm. The search is as fast as half the axis's velocity.
+/// Default speed of the approach, mm/s.
 const APPROACH_MM_S: f64 = 1.0;
+/// Default distance from the switch before the approach and after it, mm.
 const BACK_OFF_MM: f64 = 3.0;
+/// Default speed of the search for a switch, as a share of the axis's velocity limit.
 const SEEK_SHARE: f64 = 0.5;
 
 /// Longest distance from a switch, mm.

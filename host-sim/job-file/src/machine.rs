@@ -11,7 +11,7 @@ use crate::{homing, spindle, steps};
 /// Largest clearance and plunge, mm.
 const HEIGHT_MAX_MM: f64 = 1000.0;
 
-/// What three limits are.
+/// Expected value of a key with three limits, for messages.
 const LIMITS: &str = "three numbers above 0, one each for x, y and z, e.g. [100, 100, 50]";
 
 /// Keys of a job and of a machine's profile alike.

@@ -5,10 +5,11 @@ use job::{JobError, MachineProfile, Spindle, SpindleDrive};
 use crate::homing::contact;
 use crate::section::Section;
 
-/// Fastest spindle, 1/min, and longest time to its speed, ms.
+/// Largest spindle speed, 1/min.
 const RPM_MAX: f64 = 1e6;
+/// Longest time from switching the spindle on to its speed, ms.
 const AT_SPEED_MAX_MS: f64 = 60_000.0;
-/// Default of the time to the speed, ms.
+/// Default time from switching the spindle on to its speed, ms.
 const AT_SPEED_MS: f64 = 3000.0;
 
 /// Key of the contact that reports the speed.

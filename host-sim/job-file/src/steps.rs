@@ -52,8 +52,9 @@ fn fraction(text: &str) -> Option<(u32, u32)> {
     }
 }
 
-/// Default of the pulse and of the direction setup time, µs; limited to the longest that the period allows.
+/// Default length of a pulse, µs; limited to the longest that the period allows.
 const PULSE_DEFAULT_US: f64 = 1.0;
+/// Default direction setup time, µs; limited to the longest that the period allows.
 const SETUP_DEFAULT_US: f64 = 5.0;
 
 /// Longest pulse and longest direction setup time at a sampling period, µs.

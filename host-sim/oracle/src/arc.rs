@@ -5,9 +5,11 @@ use job::Along;
 use super::contact::Oracle;
 use super::smooth::SmoothParameter;
 
-/// Nodes and weights of the three-point Gauss-Legendre rule on [-1, 1]: ±sqrt(3/5) and 0; 5/9 and 8/9.
+/// Outer node of the three-point Gauss-Legendre rule on [-1, 1]: sqrt(3/5); the nodes are -`NODE`, 0 and `NODE`.
 const NODE: f64 = 0.774_596_669_241_483_4;
+/// Weight of the two outer nodes.
 const WEIGHT_OUTER: f64 = 5.0 / 9.0;
+/// Weight of the middle node.
 const WEIGHT_MIDDLE: f64 = 8.0 / 9.0;
 /// Largest length of a quadrature interval, as a share of a smooth span. The rule's relative error is `h^6 f'''''' / (2 016 000 f)`:
 /// 1e-16 for an |A| whose Taylor series converges over a quarter of the span.

@@ -5,19 +5,21 @@ use job::Along;
 
 use crate::Surface;
 
-/// Cells per span, and per side of the whole surface, with which the search for faces that look down begins.
+/// Cells per span along each parameter with which the search for places that look down begins.
 const SPAN_CELLS: usize = 8;
+/// Largest number of these cells along each parameter of the whole surface.
 const SIDE_CELLS_MAX: usize = 160;
 /// Splits of a cell in which some corners look down and others do not.
 const SPLITS: u32 = 5;
-/// z of a unit normal below which it looks down: rounding.
+/// A unit normal whose z is below this looks down; a smaller |z| is rounding.
 const DOWN: f64 = -1e-9;
 /// z of a unit normal, after a turn, that still counts as a wall: a turn is given to a millionth of a degree.
 const WALL: f64 = -1e-7;
-/// Steps of the search for a turn, and most normals that take part in it.
+/// Steps of the search for a turn.
 const STEPS: usize = 400;
+/// Largest number of normals in the search for a turn.
 const NORMALS_MAX: usize = 1500;
-/// A simple turn is preferred if it costs less than this of the least z.
+/// A simple turn is preferred if the least z of the turned normals is at most this much below that of the best turn.
 const SIMPLE: f64 = 0.1;
 /// `|S_u x S_v|` below this share of `|S_u| |S_v|`: no normal.
 const SINE_MIN: f64 = 1e-6;

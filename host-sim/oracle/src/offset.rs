@@ -65,7 +65,7 @@ impl Oracle {
         })
     }
 
-    /// The same at a point of a curve `side(path)` with this slope: the path speed and the centre's derivative are those along the curve.
+    /// [`Oracle::offset`] at a point of a curve `side(path)` with this slope: path speed and derivative of the centre are those along the curve.
     ///
     /// # Errors
     /// As [`Oracle::offset`].
@@ -115,7 +115,7 @@ impl Oracle {
         a + b * slope - turned * (self.radius_mm / a.cross(b).length_squared())
     }
 
-    /// The same near a pole, extrapolated from three places on the curve; `beside`: the pole is beside the passes.
+    /// Derivative of the centre along a curve near a pole, extrapolated from three places on the curve; `beside`: the pole is beside the passes.
     fn velocity_near_pole(
         &self,
         path: f64,
@@ -210,7 +210,7 @@ impl Oracle {
     }
 }
 
-/// The same on any path between two path parameters.
+/// [`Oracle::foot`] on any path between two path parameters, given by its offset points.
 ///
 /// # Errors
 /// Those of `offset`.

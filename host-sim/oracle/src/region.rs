@@ -137,7 +137,7 @@ impl RegionEdges {
 }
 
 impl Oracle {
-    /// The same for a cell of the region alone; the whole where the job has none.
+    /// An oracle for one cell of the region alone; for the whole surface where the region has no cell of this index.
     pub(super) fn of_cell(&self, index: usize) -> Self {
         Self {
             region: self.cells.get(index).cloned(),

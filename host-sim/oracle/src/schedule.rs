@@ -9,8 +9,9 @@ use super::contact::{Oracle, OracleError};
 use super::smooth::SmoothParameter;
 use job::{Along, Spacing};
 
-/// Points scanned per span for the least interval, and the least number of points per pass.
+/// Points per span scanned for the least interval of a pass.
 const SCAN_PER_SPAN: usize = 64;
+/// Least number of these points per pass.
 const SCAN_MIN: usize = 512;
 /// Golden-section steps: each shortens the bracket to 0.618, so 48 reduce it to 1e-10 of its length; the interval is stationary at its
 /// minimum, hence exact.

@@ -371,7 +371,7 @@ fn kept<T: DeserializeOwned>(file: &Path) -> Option<T> {
     serde_json::from_slice(&std::fs::read(file).ok()?).ok()
 }
 
-/// Keeps a region; where that fails it is made again the next time.
+/// Writes a value into the cache; where that fails, the value is made again the next time.
 fn keep<T: Serialize>(file: &Path, found: &T) {
     let (Some(folder), Ok(text)) = (file.parent(), serde_json::to_vec(found)) else {
         return;

@@ -1,11 +1,12 @@
-//! How high the part is, as a map: for orders of many links, of which each would take milliseconds by exact distances. What a link needs in the end is decided by those.
+//! A height map of the part, to compare orders of faces by the time of their links: an exact height takes milliseconds for each link. The links of a job use exact heights.
 
 use glam::DVec3;
 
 use crate::body::Part;
 
-/// Places a side of the map, at most, and across the ball's radius, at least.
+/// Largest number of places along each side of the map.
 const SIDE: f64 = 200.0;
+/// Largest number of places across the ball's radius.
 const ACROSS: f64 = 4.0;
 
 /// Heights of a ball's centre over a part.

@@ -19,31 +19,36 @@ use crate::faces::{cached, part_of};
 use crate::tool::Tool;
 use job_file::FaceError;
 
-/// The method by which links are made: others in a cache are not used.
+/// Number of the method by which links are made: cached links of another method are not used.
 const METHOD: u32 = 2;
-/// The crossing is at least so much above both ends, mm.
+/// Least height of a crossing above both ends of a link, mm.
 const LIFT_MM: f64 = 0.3;
 /// Precision of the height of a crossing, mm.
 const HEIGHT_MM: f64 = 0.25;
-/// Steps of a way that are looked at where the tool is next to the part, and the longest ones, mm. Between two places the ball is deeper by a ten thousandth.
+/// Shortest step between checked places of a way, mm: where the tool is next to the part. Between two such places the ball is deeper by a ten thousandth.
 const STEP_MM: f64 = 0.05;
+/// Longest step between checked places of a way, mm.
 const STRIDE_MM: f64 = 2.0;
-/// A straight link is at most so long, in step-overs of a plane.
+/// Longest straight link, in step-overs of a plane.
 const STRAIGHT_STEPS: f64 = 2.5;
-/// How deep the tool may enter, mm, as a share of what the job permits, and where no part says it: that of a region.
+/// Depth to which a link may enter the part, as a share of the depth that the job permits.
 const DEPTH_SHARE: f64 = 0.5;
+/// Depth to which a link may enter the surface of a job without a part, mm.
 const DEPTH_MM: f64 = 0.001;
 
 /// Unit of a detour, mm: that of the machine's words.
 const UNIT_MM: f64 = 16_384e-6;
-/// Greatest detour, units: to a side, and upwards.
+/// Greatest detour to a side, units.
 const ASIDE_MAX: f64 = 2047.0;
+/// Greatest detour upwards, units.
 const RISE_MAX: f64 = 4095.0;
-/// Detours that are tried: to a side and upwards, as shares of the length of the way, which is taken to be at least so long, mm.
+/// Detours to a side that are tried, as shares of the length of the way.
 const ASIDES: [f64; 9] = [0.0, 0.1, -0.1, 0.25, -0.25, 0.5, -0.5, 1.0, -1.0];
+/// Detours upwards that are tried, as shares of the length of the way.
 const RISES: [f64; 4] = [0.0, 0.1, 0.3, 1.0];
+/// Least length of a way for these shares, mm.
 const DETOUR_MM: f64 = 1.0;
-/// Only a way that saves more is looked for, s.
+/// Least time that a detour must save, s.
 const SAVED_S: f64 = 0.05;
 
 /// How a link goes.
@@ -117,7 +122,7 @@ pub fn ways(
     })
 }
 
-/// Where a tool is clear of a part.
+/// A tool over a part: the heights at which it crosses clear of the part.
 struct Crossings<'a> {
     part: &'a Part,
     tool: Tool,
@@ -143,13 +148,13 @@ pub struct Times {
 }
 
 impl Times {
-    /// At this feed, within these limits.
+    /// Times of ways at this feed, within these limits.
     #[must_use]
     pub const fn new(feed_mm_s: f64, limits: AxisLimits) -> Self {
         Self { feed_mm_s, limits }
     }
 
-    /// Of a move from rest to rest.
+    /// Time of a move from rest to rest, s.
     fn of(length: f64, [velocity, acceleration, jerk]: [f64; 3]) -> f64 {
         let by_jerk = (32.0 * length / jerk).cbrt();
         let ramps = velocity / acceleration + acceleration / jerk;
@@ -256,7 +261,7 @@ impl<'a> Links<'a> {
 }
 
 impl<'a> Crossings<'a> {
-    /// Of a part that the tool may enter as deep as its regions permit.
+    /// The tool may enter the part as deep as in the part's regions.
     fn new(part: &'a Part, tool: &Tool, tolerance_mm: f64, safe_mm: f64) -> Self {
         Self {
             part,
@@ -289,7 +294,8 @@ impl<'a> Crossings<'a> {
         high
     }
 
-    /// Whether the tool is clear of the part all along a straight way. The distance changes by no more than the tool moves; sideways only, that of what is above the ball.
+    /// Whether the tool is clear of the part all along a straight way. The ball's distance from the part changes by no more than the tool moves; that of shank and holder by no
+    /// more than the tool moves sideways.
     fn is_clear(&self, [from, to]: [DVec3; 2], stride: f64) -> bool {
         let length = from.distance(to);
         let mut at = 0.0;

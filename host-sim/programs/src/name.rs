@@ -4,8 +4,9 @@ use std::borrow::Cow;
 
 use crate::place::{Place, place};
 
-/// The name that the sources use in every help text and message.
+/// The tool's command in a checkout: the name that the sources use in every help text and message.
 const IN_CHECKOUT: &str = "cargo sim";
+/// The tool's command where it is installed.
 const INSTALLED: &str = "isofeed";
 
 /// The command that started the tool.

@@ -1,4 +1,4 @@
-//! What the page is made of: the job, the data of its run, and what was found.
+//! The content of the page: the job, the data of its run, and the findings.
 
 use super::mesh::Mesh;
 use super::picture::Picture;

@@ -28,7 +28,7 @@ pub(super) struct Marks {
 }
 
 impl Marks {
-    /// Those of these remarks.
+    /// The marks of these remarks.
     pub(super) fn new(oracle: &Oracle, remarks: &Remarks) -> Self {
         let above = remarks.scallops.as_ref().map(|scallops| above(oracle, scallops));
         Self {
@@ -49,7 +49,7 @@ impl Marks {
         lines(out, "iso-line iso-over", of_layer.map(|(_, run)| run));
     }
 
-    /// The marks with their numbers, hidden ones hollow, and the list, whose first line begins at `corner`.
+    /// The marks with their numbers, hidden ones as outlines, and the list, whose first line begins at `corner`.
     pub(super) fn numbers(&self, out: &mut String, scene: &Scene<'_>, corner: [f64; 2]) {
         let mut labels: Vec<([f64; 2], String)> = Vec::new();
         for (index, mark) in self.marks.iter().enumerate() {

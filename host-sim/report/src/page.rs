@@ -19,8 +19,9 @@ const REPORT_STYLE: &str = concat!(
 /// Content security policy: the browser refuses to load anything.
 const POLICY: &str =
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:";
-/// The libraries of view and charts, built by `scripts/viewer`, and the scripts of the page, which share one scope.
+/// Libraries of view and charts, built by `scripts/viewer`.
 const LIBRARIES: &str = include_str!("viewer/three-bundle.min.js");
+/// Scripts of the page, which share one scope.
 const SCRIPTS: [&str; 8] = [
     include_str!("viewer/data.js"),
     include_str!("viewer/words.js"),

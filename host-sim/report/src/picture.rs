@@ -20,19 +20,23 @@ const FRAME: Frame = [44.0, 84.0, 872.0, 432.0];
 const TOLERANCE: f64 = 0.12;
 /// Direction to the light: right, up, towards the viewer.
 const LIGHT: DVec3 = DVec3::new(-0.45, 0.62, 0.64);
-/// Colour ramp of the tool side from shadow to full light, RGB; colour of the back.
+/// Colour ramp of the tool side from shadow to full light, RGB.
 const RAMP: [[f64; 3]; 3] = [[74.0, 91.0, 112.0], [156.0, 173.0, 192.0], [232.0, 239.0, 246.0]];
+/// Colour ramp of the back of the surface from shadow to full light, RGB.
 const BACK_RAMP: [[f64; 3]; 3] = [
     [146.0, 138.0, 130.0],
     [172.0, 165.0, 157.0],
     [203.0, 197.0, 190.0],
 ];
-/// Contrast stretch: target span of brightness, largest factor, and centre.
+/// Contrast stretch: target span of brightness.
 const CONTRAST: f64 = 0.62;
+/// Contrast stretch: largest factor.
 const GAIN_MAX: f64 = 2.2;
+/// Contrast stretch: brightness at the centre of the span.
 const MIDDLE: f64 = 0.66;
-/// Approximate number of passes with an arrow, and its candidate positions along a pass, in order of preference.
+/// Approximate number of passes with an arrow.
 const ARROWS: usize = 7;
+/// Candidate positions of the arrow along a pass, as shares of its length, in order of preference.
 const ARROW_PLACES: [f64; 4] = [0.72, 0.25, 0.86, 0.5];
 /// Number of normals drawn between the highlighted pass and its CL path.
 const COMB: usize = 36;

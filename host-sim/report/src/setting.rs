@@ -7,8 +7,9 @@ use glam::DVec3;
 use job::units::MM_PER_NM;
 use job::{Block, Job};
 
-/// Number of points of all links together, and least number for one.
+/// Number of stored points of all links together.
 const LINK_POINTS: usize = 20_000;
+/// Least number of stored points of one link.
 const LINK_POINTS_MIN: usize = 8;
 
 /// A coordinate to the tenth of a micrometre.

@@ -298,18 +298,18 @@ fn marks_and_high_ridges_are_in_the_picture() {
         assert!(svg.contains(text), "{text}");
     }
     assert_eq!(svg.matches("class=\"iso-mark").count(), 10);
-    // The one behind the surface is hollow, and within the picture.
-    let hollow = svg
+    // The mark behind the surface is drawn as an outline, and lies within the picture.
+    let hidden = svg
         .lines()
         .rfind(|line| line.contains("class=\"iso-mark-hidden"))
         .unwrap();
     let centre = |name: &str| {
-        let from = hollow.find(name).unwrap() + name.len();
-        hollow[from..].split('"').next().unwrap().parse::<f64>().unwrap()
+        let from = hidden.find(name).unwrap() + name.len();
+        hidden[from..].split('"').next().unwrap().parse::<f64>().unwrap()
     };
     assert!(
         (0.0..960.0).contains(&centre("cx=\"")) && (0.0..620.0).contains(&centre("cy=\"")),
-        "{hollow}"
+        "{hidden}"
     );
     assert!(svg.contains("iso-line iso-over"));
     // One point is drawn, none is not.

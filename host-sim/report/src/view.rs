@@ -12,15 +12,17 @@ const DEPTH_SLACK: f64 = 1.5;
 const ELEVATIONS: [(f64, f64); 4] = [(26.0, 0.95), (34.0, 1.0), (43.0, 0.82), (56.0, 0.62)];
 /// Number of candidate azimuths.
 const AZIMUTHS: u32 = 36;
-/// Preferred azimuth, degrees: x to the right and towards the viewer, y away; and its weight.
+/// Preferred azimuth, degrees: x to the right and towards the viewer, y away.
 const AZIMUTH_LIKED: f64 = -60.0;
+/// Weight of the preferred azimuth.
 const AZIMUTH_WEIGHT: f64 = 0.15;
 /// Weight of a view along a side of the surface, relative to one across a corner.
 const STRAIGHT_ON: f64 = 0.5;
 /// Weight of visible back side, relative to visible tool side.
 const BACK_COUNTS: f64 = 5.0;
-/// Exponents of the visible share of the surface and of the filled share of the frame.
+/// Exponent of the visible share of the surface in the rating of a view.
 const SEEN_POWER: f64 = 0.6;
+/// Exponent of the filled share of the frame in the rating of a view.
 const FILL_POWER: f64 = 0.4;
 
 /// A frame in the picture: left, top, width, height.

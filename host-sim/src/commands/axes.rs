@@ -14,13 +14,16 @@ use job::units::NM_PER_MM;
 use machine::remote::Session;
 use machine::remote::axes;
 
-/// Default speeds, mm/s: of a jog, of a probe move, and of its second, slow one.
+/// Default speed of a jog, mm/s: the limits of the axes reduce it.
 pub(super) const JOG_MM_S: f32 = 1000.0;
+/// Default speed of a probe move, mm/s.
 pub(super) const PROBE_MM_S: f32 = 5.0;
+/// Speed of the second, slow probe move, mm/s.
 const SLOW_MM_S: f32 = 0.5;
 
-/// Way back before the slow probe move, and the length of it, nm.
+/// Way back before the slow probe move, nm.
 const BACK_NM: i32 = 1_000_000;
+/// Greatest length of the slow probe move, nm.
 const AGAIN_NM: i32 = 2 * BACK_NM;
 
 /// An axis and a distance.

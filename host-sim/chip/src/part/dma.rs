@@ -202,8 +202,9 @@ impl Dma {
         write
     }
 
-    /// Executes at once what changes no level of so many rounds of requests: one to a stream from memory to a port, and then one to a stream that copies
-    /// the idle word over what was transferred. Ends where another word than this comes, or a buffer. Returns the number of rounds executed.
+    /// Executes up to `rounds` rounds of requests at once, as long as they change no level of a pin. A round is one request to the stream from memory to a port, then one to
+    /// the stream that overwrites the transferred word with the idle word. Ends before the first word that is not idle, and before the end of a buffer. Returns the number of
+    /// rounds executed.
     pub(crate) fn pass_idle(
         &mut self,
         [to_port, to_memory]: [usize; 2],

@@ -4,13 +4,18 @@
 
 use crate::world::{NEVER, World};
 
-/// First address and bytes of the sectors, and the number of the first.
+/// First address of the sectors that keep jobs, settings and the journal.
 pub(crate) const SETTINGS: u32 = 0x0808_0000;
+/// Bytes of these sectors together.
 pub(crate) const SETTINGS_BYTES: u32 = SECTORS * SECTOR;
+/// Bytes of one of these sectors.
 const SECTOR: u32 = 128 * 1024;
+/// Number of the first of these sectors in the chip's flash.
 const FIRST: u32 = 8;
+/// Number of these sectors.
 const SECTORS: u32 = 4;
 
+/// Words that unlock `CR`, in this order (RM0090, 3.9.2).
 const KEYS: [u32; 2] = [0x4567_0123, 0xcdef_89ab];
 
 /// Registers, by offset.
@@ -25,8 +30,9 @@ const MER: u32 = 1 << 2;
 const STRT: u32 = 1 << 16;
 const LOCK: u32 = 1 << 31;
 
-/// Times (DS8626, table 40): a byte or a word, and a sector of 128 KB with a parallelism of 8, 16 and 32 bits, s.
+/// Time to write a byte or a word, s (DS8626, table 40).
 const WRITE_S: f64 = 16e-6;
+/// Time to erase a sector of 128 KB with a parallelism of 8, 16 and 32 bits, s (DS8626, table 40).
 const ERASE_S: [f64; 3] = [2.0, 1.3, 1.0];
 
 pub(crate) struct Flash {
@@ -64,7 +70,7 @@ impl Flash {
         }
     }
 
-    /// After a reset: what is written stays.
+    /// The state after a reset; the contents of the sectors stay.
     pub(crate) fn restart(&mut self) {
         (self.cr, self.keys, self.shut, self.is_cut) = (LOCK, 0, false, false);
     }

@@ -1,13 +1,16 @@
-//! A supply that falls: first the drives let go, then the voltage detector (PVD; RM0090, 5.2.2) interrupts by line 16 of EXTI (12.2.6), at last the chip is without supply.
+//! A falling supply: first the drives lose their power, then the voltage detector (PVD; RM0090, 5.2.2) interrupts by line 16 of EXTI (12.2.6), at last the chip has no supply.
 
 use crate::world::{NEVER, World};
 
-/// Bits of `PWR_CR` and `PWR_CSR`.
+/// `PWR_CR`: the voltage detector is on.
 const PVDE: u32 = 1 << 4;
+/// `PWR_CR`: level of the detector.
 const PLS: u32 = 0b111 << 5;
+/// `PWR_CSR`: the supply is below the detector's level.
 const PVDO: u32 = 1 << 2;
+/// `PWR_CSR`: the regulator is ready.
 const VOS_READY: u32 = 1 << 14;
-/// Line of the detector.
+/// Line of the detector in EXTI.
 const LINE: u32 = 1 << 16;
 
 /// Registers of EXTI, by offset.
@@ -19,10 +22,11 @@ const PR: u32 = 0x14;
 /// The supply, and the part of the interrupt controller that the detector is on.
 #[derive(Debug)]
 pub(crate) struct Supply {
-    /// The drives have none.
+    /// The drives have no power.
     pub(crate) drives_off: bool,
-    /// Times at which the detector's level is reached, and at which the chip is without supply.
+    /// Time at which the supply reaches the detector's level, cycles.
     pub(crate) low_at: u64,
+    /// Time at which the chip loses its supply, cycles.
     pub(crate) fails_at: u64,
     is_low: bool,
     imr: u32,
@@ -43,12 +47,12 @@ impl Supply {
         pr: 0,
     };
 
-    /// It begins to fall.
+    /// The supply begins to fall.
     pub(crate) const fn fall(&mut self, low_at: u64, fails_at: u64) {
         (self.drives_off, self.low_at, self.fails_at) = (true, low_at, fails_at);
     }
 
-    /// The detector's level is reached. Whether its interrupt is raised.
+    /// The supply reaches the detector's level. Returns whether that raises the interrupt.
     pub(crate) fn becomes_low(&mut self, pwr_cr: u32, world: &mut World) -> bool {
         (self.low_at, self.is_low) = (NEVER, true);
         world.event(world.now, "supply low");

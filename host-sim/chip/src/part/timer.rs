@@ -114,7 +114,7 @@ impl Timer {
         self.dier & COMPARE_1_REQUEST != 0
     }
 
-    /// Updates until a time, each with the compare that follows it and both with requests; 0 where a compare comes first.
+    /// Number of rounds until a time: a round is an update and the compare after it, both with requests. 0 where a compare is due first.
     pub(crate) fn rounds(&self, until: u64) -> u64 {
         const REQUESTS: u32 = UPDATE_REQUEST | COMPARE_1_REQUEST;
         let first = self.update_at();
@@ -126,7 +126,7 @@ impl Timer {
         until.checked_sub(over).map_or(0, |left| left / self.period() + 1)
     }
 
-    /// Executes so many of them, at least one. Returns the time of the last compare.
+    /// Executes `rounds` rounds, at least one, as [`Self::rounds`] counts them. Returns the time of the last compare.
     pub(crate) fn pass(&mut self, rounds: u64) -> u64 {
         self.update(self.update_at() + (rounds - 1) * self.period());
         let at = self.compare_at;

@@ -153,7 +153,7 @@ impl Usart {
 
     pub(crate) fn write(&mut self, offset: u32, value: u32, apb2: u64, world: &mut World) {
         match offset {
-            // RXNE and TC are taken back by a zero.
+            // Writing 0 clears RXNE and TC.
             0x00 => self.status &= value | !(RECEIVED | COMPLETE),
             0x04 => self.transmit(value as u8, apb2, world),
             0x08 => {

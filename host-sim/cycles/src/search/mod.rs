@@ -25,15 +25,17 @@ use machine::Machine;
 use machine::prepare::{Prepared, prepare};
 use machine::remote::RemoteError;
 
-/// Ticks of each job, and of one with limits, whose look-ahead takes some thousand ticks before the first pass.
+/// Ticks measured of a job without axis limits.
 const TICKS: u32 = 600;
+/// Ticks measured of a job with axis limits, whose look-ahead takes some thousand ticks before the first pass.
 const TICKS_WITHIN_LIMITS: u32 = 4500;
 
 /// Number of jobs that hill climbing starts from.
 const ELITE: usize = 8;
 
-/// Least samples of a run that is worth measuring; of the shorter ones, one in `SHORT` is measured.
+/// Least number of samples of a run that is always measured.
 const SAMPLES_MIN: u32 = 4;
+/// Of runs with fewer samples than [`SAMPLES_MIN`], one in this number is measured.
 const SHORT: u8 = 8;
 
 /// Share of jobs drawn at random; the others are mutations of the worst so far.

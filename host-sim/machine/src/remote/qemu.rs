@@ -12,8 +12,9 @@ use super::Stream;
 use super::guard::GuardedFolder;
 use programs::{Part, Unavailable};
 
-/// Program and machine: QEMU's model of the STM32F405.
+/// QEMU's program for ARM.
 const PROGRAM: &str = "qemu-system-arm";
+/// QEMU's model of a board with the STM32F405.
 const MACHINE: &str = "netduinoplus2";
 
 /// Deterministic time: 8 ns per instruction, none while sleeping.

@@ -17,8 +17,9 @@ const GAUSS: [(f64, f64); 3] = [
 ];
 /// Quadrature intervals of a station interval.
 const PIECES: usize = 4;
-/// Fewest and most pieces between even places of a segment.
+/// Fewest pieces between even places of a segment.
 const PLACES_MIN: usize = 8;
+/// Most pieces between even places of a segment.
 const PLACES_MAX: usize = 20_000;
 /// A segment shorter than this is none, path share.
 const SEGMENT_MIN: f64 = 1e-9;

@@ -25,8 +25,9 @@ const CREASE_MIN: f64 = 1e-5;
 
 /// Places between stations at which the step is checked, shares of the interval.
 const BETWEEN: [f64; 3] = [0.25, 0.5, 0.75];
-/// Iterations for a foot, and feet that are tried.
+/// Iterations of the search for a foot.
 const FOOT_ROUNDS: usize = 4;
+/// Number of feet that are tried.
 const FEET: usize = 6;
 /// Rounds in which a step is measured.
 const MEASUREMENTS: usize = 4;
@@ -37,7 +38,7 @@ struct Chord {
     foot: [f64; 2],
     /// Path share of the station.
     x: f64,
-    /// From the pass to the middle of the gap.
+    /// The step goes from the pass to the middle of the gap, not across all of it.
     is_half: bool,
 }
 

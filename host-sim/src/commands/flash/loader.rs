@@ -12,9 +12,11 @@ use super::super::{Failure, Result, out::say, output_file};
 use super::Arguments;
 use crate::probe::Image;
 
-/// The program that talks to loaders in ROM, and the identity that they have on USB.
+/// The program that talks to the chips' loaders in ROM.
 const DFU_UTIL: &str = "dfu-util";
+/// USB vendor of these loaders.
 const DFU_VENDOR: u16 = 0x0483;
+/// USB product of these loaders.
 const DFU_PRODUCT: u16 = 0xdf11;
 
 pub(super) fn command(arguments: &Arguments) -> Result<()> {

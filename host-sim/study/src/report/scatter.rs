@@ -10,11 +10,13 @@ use super::chart::{AXIS, BLUE, FINE, GREEN, GRID, INK, SIZE, VIOLET, WARM};
 use crate::paper::Study;
 use approach::Kind;
 
-/// Ranges, both logarithmic: bytes, and % of the feed.
+/// Range of the horizontal axis, bytes; logarithmic.
 const BYTES: [f64; 2] = [20.0, 3e6];
+/// Range of the vertical axis, % of the feed; logarithmic.
 const RIPPLE: [f64; 2] = [3e-6, 300.0];
-/// Height of the chart, and size of a mark, pixels.
+/// Height of the chart, pixels.
 const HEIGHT: u32 = 460;
+/// Size of a mark, pixels.
 const MARK: i32 = 7;
 /// Offset of a label from its mark, right and up, pixels.
 const LABEL_OFFSET: i32 = 9;

@@ -5,8 +5,9 @@ use oracle::Oracle;
 
 /// Points of the grid per parameter from which a search begins.
 const GRID: u32 = 96;
-/// Newton steps, and the step of both parameters, as a share of their ranges, at which they end.
+/// Largest number of Newton steps.
 const STEPS: usize = 30;
+/// The search ends at a step below this in both parameters, as a share of their ranges.
 const SETTLED: f64 = 1e-13;
 /// Starts of a search over the whole surface.
 const STARTS: usize = 6;

@@ -30,10 +30,11 @@ use stretches::Stretches;
 
 /// A centre farther than this from the radius, as a share of the radius, is off the surface.
 const CONTACT_SHARE: f64 = 0.1;
-/// The same, mm, for small balls.
+/// Least distance from the radius at which a centre is off the surface, mm; for small balls.
 const CONTACT_MIN_MM: f64 = 0.05;
-/// Share of the programmed feed from which a period counts for the ripple, if as many periods on both sides reach it too: that leaves ramps out.
+/// Share of the programmed feed that a period must reach to count for the ripple.
 const AT_FEED: f64 = 0.9;
+/// Number of periods on either side that must reach [`AT_FEED`], too: that leaves ramps out.
 const RAMP_PERIODS: usize = 50;
 /// A step of more than this many programmed steps is a jump: a link that the motion leaves out.
 const JUMP_STEPS: f64 = 3.0;
@@ -78,15 +79,15 @@ pub struct Judged {
     /// Largest distance of the centre from the exact offset surface while in contact, mm; below zero towards the surface. Where the tool comes
     /// to the surface or leaves it, the distance does not count: what is then left of the material is in the heights.
     pub path_error_mm: MotionPoint,
-    /// Root mean square of it, mm.
+    /// Root mean square of that distance, mm.
     pub path_error_rms_mm: f64,
     /// Samples whose contact is on the ball's upper half (spindle along z).
     pub above_equator: usize,
-    /// The steepest of them: z of the tool normal.
+    /// The steepest contact on the upper half: z of the tool normal.
     pub steepest: MotionPoint,
     /// Heights left on the surface.
     pub field: HeightField,
-    /// The same along lines of the surface, thinned, for a picture.
+    /// Heights left along lines of the surface, thinned, for a picture.
     pub field_lines: Vec<Vec<FieldPoint>>,
     /// The reach of the tool.
     pub reach: ReachResult,

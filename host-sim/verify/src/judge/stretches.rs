@@ -9,7 +9,7 @@ use super::Sample;
 use crate::reach::{ContactPlace, ContactSide};
 use crate::survey::SampleObserver;
 
-/// Tells of the samples in contact, each once the next one shows whether its stretch goes on.
+/// Reports the samples in contact. Each is reported when the next one has shown whether the stretch continues.
 pub(super) struct Stretches<'a, 'b> {
     each: Option<&'a mut SampleObserver<'b>>,
     feed_mm_s: f64,

@@ -37,10 +37,11 @@ const ERROR_SHARE: f64 = 0.05;
 /// Longest base, as a share of the time in which the limits permit the derivative below to reach its own limit: a step by that limit is
 /// averaged to at least 1.07 times the limit (the peak of the average's weight is 1 / nT for the acceleration, 3 / 4 nT for the jerk).
 const STEP_SHARE: f64 = 0.7;
-/// The same for the velocity, which no step precedes: within the acceleration limit the velocity's average is within 5 % of the velocity.
+/// [`STEP_SHARE`] for the velocity, which has no steps: within the acceleration limit the velocity's average is within 5 % of the velocity.
 const SPEED_SHARE: f64 = 0.2;
-/// The longest base is this many times the longest judged one, at most this many periods.
+/// The longest base is this many times the longest judged base.
 const LADDER_ABOVE: usize = 4;
+/// Longest base, periods.
 const LADDER_MAX: usize = 4096;
 
 /// Largest magnitude of a derivative of the positions.

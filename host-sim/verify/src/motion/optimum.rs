@@ -16,19 +16,23 @@ use super::timing::Timing;
 use glam::DVec3;
 use job::AxisLimits;
 
-/// Largest number of successive programmes, and the relative gain below which they end.
+/// Largest number of successive programmes.
 const PROGRAMMES: usize = 30;
+/// Relative gain of a programme below which no other follows.
 const GAIN_MIN: f64 = 1e-4;
-/// Largest number of redistributions of the limits by the use of the samples, and the tolerance of the use.
+/// Largest number of redistributions of the limits by the samples' use of them.
 const ROUNDS: usize = 5;
+/// Tolerance of the use of a limit above 1.
 const ABOVE: f64 = 3e-4;
-/// Share of the jerk limit in the ramps before the first node and after the last one; and the duration of these ramps as a share of
-/// a ramp to the feed.
+/// Share of the jerk limit in the ramps before the first node and after the last one.
 const END_JERK: f64 = 0.999;
+/// Duration of these ramps as a share of a ramp to the feed.
 const END_SHARE: f64 = 0.02;
-/// Intervals: least number over a pass; number over the distance in which the speed changes at ends and breaks; growth away from these.
+/// Least number of intervals over a pass.
 const PASS_INTERVALS: f64 = 120.0;
+/// Number of intervals over the distance in which the speed changes at ends and breaks.
 const RAMP: f64 = 40.0;
+/// Growth of the intervals away from ends and breaks, as a share.
 const GROWTH: f64 = 0.15;
 /// Change of speed over an interval, as a share of the largest, once a motion is known.
 const CHANGE: f64 = 0.04;

@@ -97,7 +97,7 @@ pub struct OptimumTimes {
     pub ratio_max: Option<f64>,
     /// Upper bound of that quotient for the passes without an optimum: theirs over the lower bound.
     pub ratio_bound: f64,
-    /// Time of the whole job over the sum of the optima, and where a pass has none, of the lower bounds: at most so much over the optimum.
+    /// Time of the whole job over the sum of the optima, with the lower bound for a pass without an optimum: an upper bound of the true quotient.
     /// `None` without limits, and where a pass has neither.
     pub whole_ratio: Option<f64>,
     /// Ends of passes that are free, because the tool turns beyond the boundary there.

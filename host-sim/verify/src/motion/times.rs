@@ -17,8 +17,9 @@ const AT_FEED: f64 = 0.99;
 const STAND_MAX_S: f64 = 0.020;
 /// Stands in contact that are stored.
 const STANDS_MAX: usize = 1000;
-/// A link that goes straight up leaves the surface, which faces up: by at least this much, nm, and by at most this much aside.
+/// Least straight rise after which a link is off the surface, nm; the surface faces up there.
 const LIFT_NM: i32 = 10_000;
+/// Greatest move to a side during a straight rise, nm.
 const ASIDE_NM: i32 = 1000;
 /// A link that comes this near to the highest point of the run, nm, is a retract: the safe height is above the whole surface.
 const SAFE_NM: i32 = 1000;
@@ -86,11 +87,11 @@ pub struct LinkTime {
     pub pass: u32,
     /// Time, standing included, s.
     pub time_s: f64,
-    /// Of it standing, s.
+    /// Part of that time at standstill, s.
     pub standing_s: f64,
-    /// Position before and after it, mm.
+    /// Positions at the start and at the end of the link, mm.
     pub ends_mm: [DVec3; 2],
-    /// Its highest z, mm.
+    /// Highest z of the link, mm.
     pub top_mm: f64,
     /// Whether it stays in contact, along the boundary.
     pub turn: bool,

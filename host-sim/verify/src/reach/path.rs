@@ -14,9 +14,9 @@ const DEPTH_MAX: usize = 33;
 #[derive(Clone, Debug, Default)]
 pub struct Motion {
     centres_nm: Vec<[i32; 3]>,
-    /// First ticks of stretches in contact and off the surface, in turn; the first one is off the surface.
+    /// First ticks of the stretches off the surface and in contact, alternately; the first stretch is off the surface.
     turns: Vec<u32>,
-    /// The same with turns in contact as off the surface: stretches on passes and between them.
+    /// First ticks of the stretches between passes and on passes, alternately: as above, but turns in contact belong to the stretches between passes.
     passes: Vec<u32>,
     /// Ticks before which the motion jumps: nothing is between these samples and those before.
     jumps: Vec<u32>,

@@ -19,9 +19,11 @@ use super::path::{Bounds, Chord, PathTree};
 const SPLITS_MAX: usize = 20;
 /// Largest number of cells evaluated for one part.
 const CELLS_MAX: usize = 2_000_000;
-/// The deepest place is searched to this share and this length, mm; a clearance to a share.
+/// Precision of the greatest depth, as a share, added to [`DEPTH_MM`].
 const DEPTH_SHARE: f64 = 0.01;
+/// Precision of the greatest depth, mm.
 const DEPTH_MM: f64 = 1e-3;
+/// Precision of a clearance, as a share.
 const CLEARANCE_SHARE: f64 = 0.02;
 
 /// Steps of the golden section along a chord: to 1e-7 of its length.
@@ -253,7 +255,7 @@ impl Query<'_> {
     }
 }
 
-/// A cell and what was found in it.
+/// A cell with the bound of its depth, and the deepest place found in it.
 struct Evaluated<C> {
     cell: C,
     bound: f64,

@@ -1,7 +1,7 @@
-//! The stock as an obstacle: the box without what the ball clears.
+//! The stock as an obstacle: the box without the material that the ball clears.
 //!
-//! The ball takes away, or has taken away, what is above its passes: all that is within its radius of a position in contact, seen from above.
-//! What remains of the box stands up to its full height.
+//! Seen from above, all material within the ball's radius of a position in contact counts as removed, at any time of the run. The rest of the box stands up to its full
+//! height.
 
 use std::cell::Cell;
 

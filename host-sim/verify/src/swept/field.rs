@@ -15,8 +15,9 @@ use glam::DVec3;
 use job::Along;
 use oracle::Oracle;
 
-/// Places from which the highest and the lowest point are searched, and bisections of the step.
+/// Number of places from which the highest point is searched, and as many for the lowest.
 const STARTS: usize = 64;
+/// Bisections of the step of such a search.
 const HALVINGS: usize = 40;
 /// Height of a point that no ball reaches, in radii.
 const MISSED_RADII: f64 = 4.0;

@@ -14,8 +14,9 @@ use oracle::Oracle;
 
 /// Largest number of points stored for all ridges together.
 const RIDGE_POINTS_MAX: usize = 100_000;
-/// Bins of the histogram per scallop limit, and their number; greater heights are in the last bin.
+/// Bins of the histogram of heights per scallop limit.
 const BINS_A_LIMIT: f64 = 10.0;
+/// Number of bins; the last one also has all greater heights.
 const BINS: usize = 13;
 /// Rounding of a centre to whole nanometres, mm: half the diagonal of a 1 nm cube.
 const ROUNDING_MM: f64 = 0.866_025_403_784_438_6e-6;

@@ -27,7 +27,7 @@ const DEPTH_SHARE: f64 = 1e-3;
 const WINDOW_MARGIN: f64 = 1.15;
 /// For a below this no contact is excluded: the ball hardly fits, or not at all.
 const FIT_MARGIN_MIN: f64 = 0.02;
-/// Largest number of enlargements of such a window.
+/// Largest number of enlargements of a window.
 const WINDOW_STEPS_MAX: usize = 8;
 /// Empty ranges.
 const EMPTY: [[f64; 2]; 2] = [[f64::INFINITY, f64::NEG_INFINITY]; 2];

@@ -9,11 +9,11 @@ use oracle::{Oracle, OracleError};
 
 /// Points across a gap, and across each part of it between knots, at which the height is evaluated besides the crest.
 const ACROSS: usize = 8;
-/// The same where other parts of the path lower the crest.
+/// [`ACROSS`] where other parts of the path lower the crest.
 const ACROSS_WHOLE: usize = 32;
 /// Initial number of stations along a gap.
 const STATIONS: usize = 96;
-/// Fewest of a gap that is short.
+/// Least initial number of stations along a short gap.
 const STATIONS_MIN: usize = 6;
 /// Largest number of bisections of the intervals between stations, and the number after which they go on only where the error bound is
 /// above its requirement.
@@ -23,12 +23,15 @@ const HALVINGS: usize = 10;
 const STATIONS_MAX: usize = 50_000;
 /// Required error bound of a gap's ridge, as a share of the scallop limit: half of [`super::ERROR_SHARE_MAX`].
 const REQUIRED_SHARE: f64 = 0.5 * super::ERROR_SHARE_MAX;
-/// Heights are equal within this share of the gap's largest, or within this, mm: the rounding of centres to nanometres.
+/// Heights that differ by at most this share of the gap's largest height are equal.
 const EQUAL_SHARE: f64 = 1e-4;
+/// Heights that differ by at most this are equal, mm: the rounding of centres to nanometres.
 const EQUAL_MM: f64 = 2e-6;
-/// Parts of a gap between curved passes by which those within a region are found, halvings to their ends, and places across.
+/// Parts of a gap between curved passes; those that lie within the region are measured.
 const SERVED_PARTS: u32 = 64;
+/// Bisections of the ends of a measured stretch.
 const SERVED_HALVINGS: u32 = 12;
+/// Places across the gap that must be within the region, as shares of its width.
 const SERVED_SHARES: [f64; 3] = [0.1, 0.5, 0.9];
 
 /// A crest lowered by another part of the path to less than this below the surface, mm, is not searched further.

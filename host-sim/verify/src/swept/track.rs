@@ -6,9 +6,9 @@ use job::Along;
 use job::units::{MM_PER_NM, NM_PER_MM};
 use oracle::PassSample;
 
-/// A sample further than this from the line on which the stored samples arrive is stored: twice the deviation of chords that is left
-/// anyway, and not below what rounding of the centres makes of a straight line.
+/// A sample farther than this share of the scallop limit from the line through the stored samples is stored: twice the deviation that chords have anyway.
 const BEND_SHARE: f64 = 2.0 * CHORD_SHARE;
+/// Least deviation from the line at which a sample is stored, nm: rounding of the centres bends a straight line by less.
 const BEND_MIN_NM: f64 = 4.0;
 
 /// One pass as emitted.
