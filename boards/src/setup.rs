@@ -131,8 +131,9 @@ pub const fn rest(lines: &[Line]) -> [u32; Port::ALL.len()] {
 
 /// `RCC_AHB1ENR`, whose lowest bits are the ports' clocks (RM0090, 7.3.10).
 const PORT_CLOCKS: u32 = 0x4002_3830;
-/// The registers of port A; those of the next are [`PORT_BYTES`] higher (RM0090, 2.3).
+/// Address of port A's registers (RM0090, 2.3).
 const PORTS_BEGIN: u32 = 0x4002_0000;
+/// Distance between the registers of a port and those of the next one, bytes.
 const PORT_BYTES: u32 = 0x400;
 
 /// A read-modify-write of a register: three words, in the layout that the reset code reads.

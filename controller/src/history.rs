@@ -147,7 +147,7 @@ mod tests {
         }
     }
 
-    /// However often the ring has gone round, every event from the first one kept to the last is what was pushed, alone and in rows.
+    /// After any number of turns of the ring, every event from the first kept to the last equals the pushed one, read alone and in rows.
     #[test]
     fn the_latest_are_kept_as_they_were() {
         let mut history = History::new();

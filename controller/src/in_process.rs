@@ -49,9 +49,9 @@ struct Half<const WORDS: usize> {
     jobs: JobStore<RamFlash<JOB_SECTOR>>,
 }
 
-/// Bytes of a sector of the board's flash.
+/// Bytes of a flash sector for settings and journal.
 const SECTOR: usize = 16 * 1024;
-/// The same of that for jobs.
+/// Bytes of a flash sector for jobs.
 const JOB_SECTOR: usize = 32 * 1024;
 
 impl<const WORDS: usize> Machine for Half<WORDS> {
@@ -234,7 +234,7 @@ impl<const WORDS: usize> Board<WORDS> {
         Self::with_flash(self.half.settings.into_flash(), self.half.jobs.into_flash())
     }
 
-    /// The same, with a supply that lasts for the record of its falling.
+    /// Cuts the power, and restores it, with a supply that lasts until the record of its falling is written.
     #[must_use]
     pub fn power_cycle_slowly(self) -> Self {
         let prepared = self.half.prepared;
@@ -267,7 +267,7 @@ impl<const WORDS: usize> Board<WORDS> {
         self.half.real_time.plan();
     }
 
-    /// The same, but the planning does not get to run.
+    /// As [`Self::tick_with`], without the planning after it.
     pub fn tick_without_planning(&mut self, missed: u32, cycles: u32) {
         let mut events = Vec::new();
         if let Some(command) = self.half.commands.pop_front() {

@@ -40,11 +40,11 @@ const CHUNK: usize = 16;
 /// Where a job is kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct JobPlace {
-    /// Offset of its entry, bytes.
+    /// Offset of the job's entry, bytes.
     offset: u32,
-    /// Number of its words.
+    /// Number of the job's words.
     words: u32,
-    /// The greater one of two jobs was stored later.
+    /// Order of storing: the job with the greater number was stored later.
     sequence: u32,
 }
 
@@ -73,9 +73,9 @@ fn padded(name: &str) -> Name {
     padded
 }
 
-/// What is at a place of a sector.
+/// Content of a sector at an offset.
 enum Entry {
-    /// Nothing: the end of what is written.
+    /// Nothing: the end of the written part.
     Blank,
     /// A head that was not written to its end.
     Broken,
@@ -141,8 +141,8 @@ impl<F: NorFlash> JobStore<F> {
         store
     }
 
-    /// Whether the sector that begins here is blank to its end: an erase that was cut short may have reached its begin only. Every eighth word is read, because all take
-    /// 13 ms; what is left of jobs is longer, and a job that does not read back is not kept.
+    /// Whether the sector that begins here is blank to its end: an erase that was cut short may have reached its beginning only. Every eighth word is read, because all take
+    /// 13 ms; remains of a job are longer than that, and a job that does not read back is not kept.
     fn is_blank(&mut self, begin: u32) -> bool {
         let words = (begin..begin + Self::SECTOR).step_by(8 * WORD as usize);
         for at in words {

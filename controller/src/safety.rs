@@ -293,7 +293,7 @@ impl Safety {
         self.status.pause = PauseCause::None;
     }
 
-    /// The board pauses a run by itself; `None`: it goes on.
+    /// Reports that the board pauses a run by itself, for this cause; `None`: the run continues.
     pub(crate) const fn set_pause(&mut self, cause: PauseCause) {
         self.status.pause = cause;
     }
@@ -386,7 +386,7 @@ pub fn may_start(status: &SafetyStatus) -> Result<(), Reason> {
 /// Whether the safety door lets a run resume, and the spindle turn.
 ///
 /// # Errors
-/// It is open.
+/// The door is open.
 pub fn may_resume(status: &SafetyStatus) -> Result<(), Reason> {
     if !status.lines.has(InputLines::DOOR) {
         return Ok(());

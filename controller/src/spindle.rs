@@ -35,9 +35,9 @@ pub const BELOW_TICKS: u32 = 100;
 pub(crate) enum Readiness {
     /// The spindle is at speed, or is not needed.
     AtSpeed,
-    /// Not yet.
+    /// The spindle is not at speed yet.
     Waits,
-    /// It did not report its speed in time.
+    /// The spindle did not report its speed in time.
     TooSlow,
 }
 

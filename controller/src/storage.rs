@@ -1,8 +1,8 @@
 //! Records in flash that survive a power cut at any instant.
 //!
-//! Two sectors, each divided into slots of [`SLOT`] bytes; a record takes as many of them as it needs. It is appended to the active sector: sequence number, kind, payload, then a CRC-32;
-//! one that was not written to its end does not count. The active sector is that of the newest record. When it is full the other one goes on, with a
-//! copy of what is in force. **An erase stops the processor for seconds**, so it happens at power-up only ([`Storage::open`]): then the spare sector is erased,
+//! Two sectors, each divided into slots of [`SLOT`] bytes; a record takes as many slots as it needs. A record is appended to the active sector: sequence number, kind, payload,
+//! then a CRC-32; one that was not written to its end does not count. The active sector is that of the newest record. When it is full, the other sector becomes active, and
+//! begins with a copy of the records in force. **An erase stops the processor for seconds**, so it happens at power-up only ([`Storage::open`]): then the spare sector is erased,
 //! and a record in the active one says so. Without that record it is erased again, because an erase that was cut short may leave bits that read differently
 //! every time.
 //!
@@ -139,7 +139,7 @@ impl<F: NorFlash> Storage<F> {
         };
         let [mut first, mut second] = [0, 1].map(|sector| storage.look(sector, BLANK_SLOTS));
         if first.sequence == 0 && second.sequence == 0 {
-            // Nothing is known of them: each slot is looked at.
+            // No record was found near the beginnings: search every slot.
             [first, second] = [0, 1].map(|sector| storage.look(sector, Self::SLOTS));
         }
         let (active, other) = if second.sequence > first.sequence {
@@ -245,7 +245,7 @@ impl<F: NorFlash> Storage<F> {
         self.append(kind, payload)
     }
 
-    /// Goes on in the other sector. The full one stays until the next power-up, when what is in force there is copied, and it is erased.
+    /// Makes the other sector the active one. The full one stays until the next power-up, which copies its records in force and erases it.
     fn swap(&mut self) -> Result<(), StorageError> {
         if !self.active.has_spare {
             return Err(StorageError);

@@ -70,7 +70,7 @@ impl Events for EventQueue {
             Event::Sample(sample) => Entry::Sample(sample),
             Event::Pass(pass) => Entry::Pass(pass),
             Event::Room(room) => Entry::Room(room),
-            // First, so that it is there when its place is read.
+            // The status first, so that it is in its queue when the entry is read.
             Event::Halted(status) if self.entries.ready() && self.statuses.enqueue(status).is_ok() => {
                 Entry::Halted
             }

@@ -28,7 +28,7 @@ pub struct Journal {
 pub const JOURNAL_BYTES: usize = 28;
 
 impl Journal {
-    /// Its bytes.
+    /// The journal as bytes.
     #[must_use]
     pub fn write(&self) -> [u8; JOURNAL_BYTES] {
         let mut bytes = [0; JOURNAL_BYTES];

@@ -295,19 +295,19 @@ pub enum Request {
     },
     /// Keeps the loaded job beyond a power cut, in place of one of that name. Refused while a run is under way.
     StoreJob {
-        /// The name to keep it by.
+        /// Name of the stored job.
         name: JobName,
-        /// Its runs begin where the axes stand, not at its home.
+        /// Runs begin where the axes stand, not at the job's home.
         begins_anywhere: bool,
     },
-    /// Keeps a job no longer. Refused while a run is under way.
+    /// Deletes a stored job. Refused while a run is under way.
     DeleteJob {
         /// Its name.
         name: JobName,
     },
     /// Asks for a stored job.
     StoredJob {
-        /// Its number, from 0.
+        /// Number of the job, from 0.
         index: u8,
     },
     /// Loads a stored job, and starts it.

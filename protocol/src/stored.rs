@@ -15,9 +15,9 @@ pub type JobName = String<JOB_NAME_MAX>;
 /// A job that a board keeps, apart from its words.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StoredJob {
-    /// Its name.
+    /// Name of the job.
     pub name: JobName,
-    /// All but the surface's data.
+    /// The job without the surface's data.
     #[serde(with = "HeaderFields")]
     pub header: Header,
     /// Data words.
@@ -27,7 +27,7 @@ pub struct StoredJob {
     pub digest: u64,
     /// Spindle and coolant of its runs.
     pub spindle: SpindleOrder,
-    /// Its run begins where the axes stand, not at its home.
+    /// Runs begin where the axes stand, not at the job's home.
     pub begins_anywhere: bool,
 }
 
@@ -35,7 +35,7 @@ pub struct StoredJob {
 pub const STORED_JOB_BYTES_MAX: usize = 244;
 
 impl StoredJob {
-    /// Its bytes; none where they are too many, which a header within its bounds never makes them.
+    /// Writes the job; `None` if it is longer than [`STORED_JOB_BYTES_MAX`], which no header within its bounds is.
     #[must_use]
     pub fn write<'a>(&self, bytes: &'a mut [u8; STORED_JOB_BYTES_MAX]) -> Option<&'a [u8]> {
         postcard::to_slice(self, bytes).ok().map(|written| &*written)

@@ -13,13 +13,13 @@ use protocol::message::{Activity, Homing as Profile, InputLines, MotionEnd};
 
 use super::Contact;
 
-/// The search goes on for this part of the travel beyond it, in eighths.
+/// The search for a switch ends this far beyond the travel, in eighths of the travel.
 const BEYOND_EIGHTHS: i64 = 1;
 
-/// Moves off the switch before it counts as stuck.
+/// Number of moves off a switch after which the switch counts as stuck.
 const TRIES: u8 = 6;
 
-/// What follows.
+/// Next step of a homing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Next {
     /// A move by this distance, nm, at this speed, mm/s.
@@ -28,7 +28,7 @@ pub(super) enum Next {
     Placed(i32),
     /// The axis is homed.
     AxisDone,
-    /// It failed.
+    /// The homing has failed.
     Fails(MotionEnd),
 }
 

@@ -22,9 +22,9 @@ const BUTTON_PERIODS: u32 = 20;
 pub(super) struct Button {
     /// Time of the last look, periods since power-up.
     looked: u32,
-    /// It was released at the last look.
+    /// The button was released at the last look.
     was_released: bool,
-    /// It has started the run that is under way, and no host was heard since.
+    /// The button has started the run that is under way, and no host was heard since.
     pub(super) runs_alone: bool,
 }
 

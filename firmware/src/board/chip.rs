@@ -111,8 +111,9 @@ pub(crate) const HAS_JOURNAL: bool = true;
 /// The safety inputs are pins.
 pub(crate) use crate::drivers::gpio::Ports as InputPorts;
 
-/// The line of the voltage detector in the interrupt controller, and its output.
+/// Line of the voltage detector in EXTI.
 const PVD_LINE: u32 = 1 << 16;
+/// Output of the voltage detector in `PWR_CSR`: the supply is below its level.
 const PVDO: u32 = 1 << 2;
 
 /// Has the voltage detector interrupt at 2.9 V, its highest level, falling and rising.

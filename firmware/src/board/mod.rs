@@ -136,11 +136,11 @@ pub(crate) struct Board {
     pub(crate) usart1: pac::USART1,
     /// The watchdog, not started.
     pub(crate) iwdg: pac::IWDG,
-    /// Where settings are kept.
+    /// Flash sectors of settings and journal.
     pub(crate) settings: SettingsFlash,
-    /// Where jobs are kept.
+    /// Flash sectors of jobs.
     pub(crate) jobs: JobFlash,
-    /// Where settings are kept once more, for the record of a failing supply.
+    /// Flash sectors of settings and journal, for the record of a failing supply.
     pub(crate) falling: FallingFlash,
     /// Why the chip started.
     pub(crate) reset: ResetCause,

@@ -11,25 +11,30 @@ use stm32f4xx_hal::pac;
 
 use crate::board::TIMER_HZ;
 
-/// First sector and its address; a chip of 1 MB has twelve sectors, the last seven of this size.
+/// Number of the first of the two sectors for settings and journal.
 const SETTINGS: u8 = 10;
+/// Number of the first of the two sectors for jobs.
 const JOBS: u8 = 8;
+/// Bytes of a large sector; of the twelve sectors of a chip of 1 MB the last seven are large.
 const SECTOR: u32 = 128 * 1024;
-/// The first five sectors have the size of one: 4 x 16 KB + 64 KB.
+/// Number of the first large sector.
 const FIRST_LARGE: u32 = 5;
+/// Address of the first large sector: the five before it have its size together, 4 x 16 KB + 64 KB.
 const LARGE_BEGIN: u32 = 0x0802_0000;
 
+/// Words that unlock `FLASH_CR`, in this order (RM0090, 3.9.2).
 const KEYS: [u32; 2] = [0x4567_0123, 0xcdef_89ab];
-/// Bits of `FLASH_CR`: write, erase a sector, words, start.
+/// Bits of `FLASH_CR`: write, erase a sector, by words, start, locked.
 const PG: u32 = 1 << 0;
 const SER: u32 = 1 << 1;
 const WORDS: u32 = 0b10 << 8;
 const STRT: u32 = 1 << 16;
 const LOCK: u32 = 1 << 31;
-/// Errors in `FLASH_SR`, taken back by writing them.
+/// Error flags of `FLASH_SR`; writing 1 clears a flag.
 const ERRORS: u32 = 0xf2;
+/// `FLASH_SR`: an operation is under way.
 const BUSY: u32 = 1 << 16;
-/// The slowest write of a word with what is done around it, in counts of the sample timer: 100 us and 10.
+/// Longest write of a word, 100 us, with the code around it, 10 us; counts of the sample timer.
 const WORD_COUNTS: u32 = TIMER_HZ / 1_000_000 * 110;
 
 /// Bytes of a word.
@@ -85,11 +90,11 @@ fn operate(flash: &pac::FLASH, control: u32, start: impl FnOnce()) -> Result<(),
 /// Two sectors as a flash of their own, from this one on. Urgent: words are not held back before a tick.
 pub struct Sectors<const FIRST: u8, const URGENT: bool>(pac::FLASH);
 
-/// Those of the settings and the journal.
+/// The sectors of settings and journal.
 pub(crate) type SettingsFlash = Sectors<SETTINGS, false>;
-/// The same, for the record of a failing supply.
+/// The sectors of settings and journal for the record of a failing supply, whose words are written at once.
 pub(crate) type FallingFlash = Sectors<SETTINGS, true>;
-/// Those of the jobs.
+/// The sectors of jobs.
 pub(crate) type JobFlash = Sectors<JOBS, false>;
 
 /// The sectors of settings and of jobs, and those of the settings once more, for the record of a failing supply.

@@ -20,12 +20,12 @@ pub(crate) trait ReadPorts {
 struct Watched {
     port: Port,
     mask: u32,
-    /// Their last levels.
+    /// Last levels of these pins.
     seen: u32,
 }
 
 impl Watched {
-    /// Their present levels.
+    /// Present levels of these pins.
     #[inline(always)]
     fn pins(&self, ports: &impl ReadPorts) -> u32 {
         ports.input(self.port) & self.mask

@@ -2,7 +2,7 @@
 
 use stm32f4xx_hal::pac;
 
-/// The duty cycle of the output, in steps of [`protocol::message::PWM_STEPS`]; the timer's next period has it.
+/// Sets the duty cycle of the output, in steps of [`protocol::message::PWM_STEPS`], from the timer's next period on.
 pub(crate) fn set(steps: u32) {
     // SAFETY: TIM12 belongs to this module; the board's set-up has started it. Any value may be written to `CCR2`.
     #[allow(unsafe_code, reason = "the tick has no peripherals of its own")]
