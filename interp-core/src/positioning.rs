@@ -50,7 +50,7 @@ impl MoveLimits {
         }
     }
 
-    /// The same with a velocity of at most this, mm/s.
+    /// These limits with a velocity of at most `velocity`, mm/s.
     #[must_use]
     pub fn at_speed(self, velocity: f32, period_s: f32) -> Self {
         let nm = crate::math::number::NM_PER_MM_F32 * ONE * period_s;

@@ -3,7 +3,7 @@
 //! | word | way |
 //! |---|---|
 //! | [`LINK_STRAIGHT`] | straight, at the feed |
-//! | below [`LINK_HEIGHT_MIN`] | around what is between: straight to a place beside the middle, and from there straight to the pass, at the feed ([`Detour`]) |
+//! | below [`LINK_HEIGHT_MIN`] | around the obstacle between the passes: straight to a place beside the middle, and from there straight to the pass, at the feed ([`Detour`]) |
 //! | from there on | up to this height of the ball's centre, nm, across and down |
 
 use crate::job::AxisLimits;
@@ -14,9 +14,9 @@ use crate::math::number::Bounded;
 pub const LINK_STRAIGHT: i32 = i32::MIN;
 /// Unit of a detour, nm: the parts of a word times this are its lengths.
 pub const DETOUR_UNIT_NM: i32 = 1 << 14;
-/// Greatest part of a detour to a side, and upwards, in units: 33.5 and 67.1 mm.
+/// Greatest part of a detour to a side, units: 33.5 mm.
 pub const ASIDE_MAX: i16 = (1 << 11) - 1;
-/// As [`ASIDE_MAX`], upwards.
+/// Greatest part of a detour upwards, units: 67.1 mm.
 pub const RISE_MAX: u16 = (1 << RISE_BITS) - 1;
 const RISE_BITS: u32 = 12;
 /// Bits of a detour.
@@ -34,7 +34,7 @@ pub struct Detour {
 }
 
 impl Detour {
-    /// Its word; parts that are too large are limited.
+    /// The word of this detour; parts that are too large are limited.
     #[must_use]
     pub fn to_word(self) -> i32 {
         let aside = i32::from(self.aside).clamp(-i32::from(ASIDE_MAX), i32::from(ASIDE_MAX)) + (1 << 11);

@@ -119,9 +119,9 @@ pub enum Spacing {
     /// Passes of constant scallop height ([`crate::Interpolator::plan`] makes each from the one before): curves `side = g(path)`, the first on the surface's first side
     /// boundary. The limit holds as with [`Self::Exact`].
     Constant = 2,
-    /// The same from the middle of the side parameter to its end, then from the middle to its start.
+    /// As [`Self::Constant`], from the middle of the side parameter to its end, then from the middle to its start.
     ConstantFromMiddle = 3,
-    /// The same from the last side boundary to the first.
+    /// As [`Self::Constant`], from the last side boundary to the first.
     ConstantFromEnd = 4,
     /// As [`Self::Exact`], where the last side boundary is a single point: within axis limits it is one sample with one normal, and the step to it is half as long. With [`Self::Exact`] there the crest beside the point may be
     /// four times the limit.

@@ -4,17 +4,19 @@ use crate::job::program::Job;
 use crate::math::arith::{count_to_f32, power_of_two};
 use crate::sample::SpanParameter;
 
-/// Words of a station, and of one of a job with a region: a front that holds no pass has columns of its own.
+/// Words of a station.
 const COLUMNS: usize = 13;
+/// Words of a station of a job with a region: a front that holds no pass has columns of its own.
 const COLUMNS_OF_REGION: usize = COLUMNS + 2;
-/// Parts of each path span between stations, as powers of two: at least, and at most for a surface of many spans.
+/// Least number of parts of each path span between stations, as a power of two.
 const BITS_MIN: u8 = 1;
+/// Greatest number of these parts on a surface of many spans, as a power of two.
 const BITS_MANY: u8 = 3;
-/// Parts of the whole path parameter at most, except where [`BITS_MANY`] gives more.
+/// Greatest number of parts of the whole path parameter, except where [`BITS_MANY`] gives more.
 const PARTS: u32 = 64;
 /// Fewest parts of the whole path parameter.
 const INTERVALS_MIN: u32 = 8;
-/// Most parts in all: bounds the loops over the stations.
+/// Greatest number of parts of the whole path parameter on any surface: bounds the loops over the stations.
 const PARTS_MAX: u32 = 512;
 
 /// Most spans of the path parameter.

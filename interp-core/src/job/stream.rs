@@ -122,13 +122,13 @@ impl StripInJob {
 /// The rows that have to be there before a pass is planned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RowsNeeded {
-    /// The first row that is still needed of the passes before it; none where these are over.
+    /// The first row that the passes before the planned one still need; none where these are over.
     pub behind: Option<u16>,
-    /// The row of the pass before it.
+    /// The row of the pass before the planned one.
     pub before: u16,
-    /// Its own row.
+    /// The row of the planned pass.
     pub own: u16,
-    /// The last row that is looked at from there.
+    /// The last row that the planning reads.
     pub last: u16,
 }
 

@@ -354,8 +354,8 @@ pub(crate) fn inverse_sqrt(value: f32) -> f32 {
     second + second * (0.5 - half * second * second)
 }
 
-/// Values that are computed here. Given the freedom, LLVM delays a part of the computation to where each value is used, and what it keeps meanwhile does not
-/// fit into the registers of a Cortex-M.
+/// Forces these values to be computed here. Left unconstrained, LLVM delays a part of the computation to where each value is used, and its intermediate results do not fit
+/// into the registers of a Cortex-M.
 #[inline(always)]
 #[must_use]
 #[cfg(all(target_arch = "arm", target_abi = "eabihf"))]

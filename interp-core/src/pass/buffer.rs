@@ -36,16 +36,16 @@ enum Task {
     Faulty,
 }
 
-/// What is known of the piece after the current one.
+/// Knowledge of the piece after the current one.
 #[derive(Clone, Copy, Debug)]
 enum Ahead {
     /// Nothing yet.
     Unknown,
     /// There is none: the pass ends with the current one.
     None,
-    /// It is on another patch, which is collapsed if that is true.
+    /// The next piece is on another patch; the flag: that patch is collapsed.
     Patch(Piece, bool),
-    /// It is another curve on the same patch. With the jump there of the derivative of the logarithmic speed derivative, once that is known.
+    /// The next piece is another curve on the same patch. The number: the jump there of the derivative of the logarithmic speed derivative, once it is known.
     Station(Piece, OnFront, Option<f32>),
 }
 

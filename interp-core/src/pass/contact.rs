@@ -105,12 +105,13 @@ fn inverse_cubic(arc: f32, start: &PathSpeed, end: &PathSpeed, covered: f32, len
     part * (rest * rest * first + part * ((3.0 - 2.0 * part) * length - rest * last))
 }
 
-/// Arcs that may be too long until the step is a fault, and the first part of the arc of a period.
+/// Largest number of refused arcs in a step: one more is a fault.
 const REFUSALS_MAX: u8 = 16;
+/// Length of the first part of a period's arc, as a share of the arc.
 const FIRST_PART: f32 = 0.25;
 
-/// The parts of a period's arc where a front bends so sharply that the speed changes too much over all of it: half as long after one that is too long, twice as long after
-/// two others.
+/// The parts in which a period's arc is found where a front bends so sharply that the speed changes too much over the whole arc. A part is half as long after one that was
+/// too long, and twice as long after two that were not.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Parts {
     length: f32,
@@ -127,12 +128,12 @@ impl Parts {
         goes_on: true,
     };
 
-    /// The next part of what is left.
+    /// The length of the next part, of the rest of the arc.
     pub(crate) fn next(&self, rest: f32) -> f32 {
         self.length.at_most(rest)
     }
 
-    /// After an arc that is too long. False where too many were.
+    /// Halves the parts after one that was too long. Returns false after too many of these.
     pub(crate) fn shorten(&mut self, length: f32) -> bool {
         self.length = length * if self.refusals == 0 { FIRST_PART } else { 0.5 };
         self.goes_on = false;

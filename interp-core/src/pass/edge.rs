@@ -35,18 +35,23 @@ const FOURTH_MIN: f32 = 0.02;
 /// Evaluations of one round: a line between the passes, the point on it, and the balls of each pass.
 pub(crate) const EVALUATIONS: u8 = 2 + 2 * TRIALS;
 
-/// Margin in height, per relative difference of the step from the distance at which the crest was measured: a share of the difference between the mean over
-/// the distance and that of a linear inverse square interval, of the square of the rise, for a knot within the distance, and always. By the campaign of `tests/scallop_limit`.
+// The first four margins in height are per relative difference of the step from the distance at which the crest was measured. All are by the campaign of
+// `tests/scallop_limit`.
+/// Margin as a share of the difference between the mean over the distance and the mean of a linear inverse square interval.
 const MARGIN_OF_CHANGE: f32 = 0.4;
+/// Margin as a share of the square of the rise of the mean over the inverse square interval of the pass.
 const MARGIN_OF_RISE: f32 = 0.25;
+/// Margin for a knot within the distance.
 const MARGIN_OF_KNOT: f32 = 0.02;
+/// Margin on every surface.
 const MARGIN: f32 = 0.003;
 /// Margin in height for a knot within the distance, also at the distance: the balls' heights have a jump in their second derivative there.
 const MARGIN_AT_KNOT: f32 = 0.005;
-/// The whole of it where the inverse square interval changes by 5 %; on a plane there is none.
+/// Inverse of the change of the inverse square interval, 5 %, from which [`MARGIN_AT_KNOT`] counts in full; on a plane it does not count.
 const VARIES: f32 = 20.0;
-/// Margin in height at the distance on any surface: a share of how the inverse square interval varies, and its greatest.
+/// Margin in height at the distance on any surface, as a share of the variation of the inverse square interval.
 const MARGIN_OF_VARIATION: f32 = 0.02;
+/// Greatest margin in height by the variation.
 const MARGIN_OF_VARIATION_MAX: f32 = 5e-5;
 /// Greatest margin in the step.
 const MARGIN_MAX: f32 = 0.05;

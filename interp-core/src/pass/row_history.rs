@@ -1,4 +1,4 @@
-//! Rows of patches of the last passes, for a job that is loaded while it runs: what the planning of a pass may look at, and how far the next pass may be.
+//! Rows of patches of the last passes, for a job that is loaded while it runs: which rows the planning of a pass may read, and how far away the next pass may be.
 
 use crate::fault::Result;
 use crate::job::stream::RowsNeeded;
@@ -7,15 +7,16 @@ use crate::math::number::Bounded;
 use crate::pass::schedule;
 use crate::sample::SpanParameter;
 
-/// Rows of the last passes: what the planning of a pass may look at, and how far the next pass may be.
+/// Rows of the last passes: which rows the planning of a pass may read, and how far away the next pass may be.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RowHistory {
     /// Row of the pass that is planned, of the one before it, and of the one before that.
     rows: [u16; 3],
-    /// The last row that is sure to be there, in a job with turns, and the row of the next pass that rows were asked for.
+    /// The last row that is certainly loaded, in a job with turns.
     granted: u16,
+    /// The row of the next pass for which rows were requested.
     asked: Option<u16>,
-    /// A turn leads to the pass that is planned, so that nothing can be waited for before it.
+    /// A turn leads to the pass that is planned, so the tool cannot wait for rows before it.
     is_turned: bool,
 }
 
@@ -26,13 +27,13 @@ const STEPS_TURNED: f32 = 4.0;
 /// The first row that is needed where the planning of a pass begins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum FirstRow {
-    /// That of the pass itself: without limits it is looked at while the tool is on it.
+    /// The row of the planned pass itself: without limits a pass is scanned while the tool is on it.
     Own,
-    /// That of the pass before it, which the tool is about to begin from above.
+    /// The row of the pass before, which the tool is about to begin from above.
     Before,
-    /// That of the pass before that one, whose end the tool leaves along the surface's boundary.
+    /// The row of the pass before that one, whose end the tool leaves along the surface's boundary.
     Left,
-    /// The same, where turns may lead from pass to pass: all rows of the window from there on are asked for at a rest, and turns lead on for as long as these last.
+    /// As [`Self::Left`] where turns may lead from pass to pass: all rows of the window from there on are requested at a rest, and turns follow for as long as these last.
     Turned,
 }
 
@@ -115,8 +116,8 @@ impl RowHistory {
 
     /// The pass after this one, by a step from it; see [`schedule::next_side`].
     ///
-    /// It is where the planning of this pass may look, and no farther than the start of the last row that its own planning may look at, so that it has a row to look at. Where
-    /// the first row needed is that of the last pass but one, it leaves a row to the pass after it, so that each pass gets on.
+    /// That pass lies in a row that the planning of this pass may read, and no farther than the start of the last row that its own planning may read, so that there is one.
+    /// Where the first row needed is that of the last pass but one, it leaves a row to the pass after it, so that each pass advances.
     ///
     /// # Errors
     /// Those of [`schedule::next_side`].
@@ -159,7 +160,7 @@ impl RowHistory {
         row.saturating_add(1) >= header.side_spans
     }
 
-    /// Whether a turn may lead from the pass that is planned to the next one: whether the rows last for what is planned before the tool can come to rest again.
+    /// Whether a turn may lead from the pass that is planned to the next one: whether the loaded rows suffice for all passes planned before the tool can rest again.
     pub(crate) fn may_turn(
         &self,
         header: &Header,

@@ -3,7 +3,7 @@
 //! | file | holds |
 //! |---|---|
 //! | [`travel`] | position and progress, and the sample there |
-//! | [`next_pass`] | what is planned for the next pass, and its begin |
+//! | [`next_pass`] | the planning of the next pass, and its begin |
 //! | [`ahead`] | the move of the next tick, made before it |
 //! | [`place`] | where the run is on its pass, for the feed |
 
@@ -31,19 +31,21 @@ use travel::{Next, Travel};
 /// crossing would add its cost to the worst-case tick.
 const CROSSINGS_MAX: u8 = 1;
 
+/// [`CROSSINGS_MAX`] of jobs of constant scallop height within axis limits: the intervals of a front are two periods long, except on short passes, and the shortest passes are
+/// lines beside a point.
+const CROSSINGS_ON_FRONT_MAX: u8 = 4;
+
+/// [`CROSSINGS_MAX`] of a front without axis limits, which is passed at the full feed in a sharp corner of the surface, too.
+const CROSSINGS_AT_FEED_MAX: u8 = 7;
+
 /// Step of the parameter on a pole: 16 per span. Between two steps the speed of the side lines, a rational cubic of the path
 /// parameter, changes little.
 const POLE_STEP: u64 = 1 << 60;
 
-/// Greatest correction of a step beyond a station, as a share of what is beyond it.
+/// Greatest correction of a step beyond a station, as a share of the arc beyond the station.
 const SHARE_MAX: f32 = 1.0 / 256.0;
 
-/// The same on passes of constant scallop height: the intervals of a front are two periods long, except on short passes, and the shortest passes are lines beside a point. Within axis
-/// limits, and at the full feed in a sharp corner of the surface.
-const CROSSINGS_ON_FRONT_MAX: u8 = 4;
-const CROSSINGS_AT_FEED_MAX: u8 = 7;
-
-/// Arcs of a period at most: up to each boundary, and parts of it in sharp bends of a front.
+/// Most arcs of one period: one up to each boundary, and more in sharp bends of a front.
 const ARCS_MAX: u8 = 32;
 
 /// A run: the travel and the patch buffer.
@@ -111,11 +113,12 @@ impl Run {
         self.last_interval
     }
 
-    /// The same as before a run, and as after one.
+    /// Removes the minimum, as before a run.
     pub(crate) const fn forget_interval(&mut self) {
         self.last_interval = f32::INFINITY;
     }
 
+    /// Sets the minimum, as after a pass.
     pub(crate) const fn keep_interval(&mut self, interval: f32) {
         self.last_interval = interval;
     }

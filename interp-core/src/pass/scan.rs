@@ -25,8 +25,9 @@ pub(crate) mod cycles {
     pub(super) const MEASURED_PATCH: u32 = PATCH + 1_800;
 }
 
-/// Cycles of the planning in a period of 1 ms, a share of the period; never less than one piece, nor more than in 1 ms.
+/// Cycles for the scan in a period of 1 ms or more; a shorter period has its share, at least one piece.
 const PORTION_CYCLES: f32 = 26_500.0;
+/// Period to which [`PORTION_CYCLES`] refers, s.
 const PORTION_PERIOD_S: f32 = 1e-3;
 /// Most pieces of a period: each takes at least [`cycles::NEXT`].
 const PIECES_MAX: u8 = 33;

@@ -147,7 +147,7 @@ impl CurvePass {
         point
     }
 
-    /// The same as a fraction of the side span.
+    /// The side parameter at a path parameter, as a fraction of the side span, 2^-64.
     pub(crate) fn side_fraction(&self, fraction: u64) -> u64 {
         self.own_side(&self.side(fraction))
     }
@@ -489,7 +489,7 @@ impl SidePoint {
         self.in_order(point_by_rows(block, side, w), &Factors::ONE)
     }
 
-    /// The same of a rational one.
+    /// A coordinate of a rational patch; see [`Self::in_order`].
     #[inline(always)]
     fn rational_axis(&self, block: &[i32; 16], side: i32, w: i32, weight: &Weight) -> (CoordinatePoint, f32) {
         let (numerator, _) = computed(point_by_rows(block, side, w), 0.0);

@@ -58,7 +58,7 @@ const TANGENT_MIN_SQUARED: f32 = SINE_MIN * SINE_MIN / (1.0 - SINE_MIN * SINE_MI
 pub(crate) struct IsoLine {
     /// Side parameter within its span, units of 2^-64.
     pub(crate) fraction: u64,
-    /// The same, centred, fixed point.
+    /// Side parameter centred on its span, fixed point.
     pub(crate) side: i32,
     /// The pass runs against the path parameter.
     pub(crate) reversed: bool,
@@ -333,7 +333,7 @@ impl Pass for Surface {
 }
 
 impl Surface {
-    /// [`Pass::contact`] on a line of constant side parameter, for what is never on a curve.
+    /// [`Pass::contact`] on a line of constant side parameter, for callers that are never on a curve.
     ///
     /// # Errors
     /// As [`Pass::contact`].

@@ -65,7 +65,7 @@ pub(crate) fn front_side_scale(sum: f32) -> f32 {
     to_f32(1 << FRONT_SIDE_BITS) / sum
 }
 
-/// Width of a span other than the last, whose width is what is left.
+/// Width of a span other than the last, units of the fronts; the last span has the rest.
 pub(crate) fn front_side_width(width: f32, scale: f32) -> i32 {
     truncated(width * scale).max(1)
 }

@@ -2,10 +2,11 @@
 
 use super::{CROSSINGS_MAX, CellWords, Edge};
 
-/// Edges that are taken in, and that are met, in a portion of the planning.
+/// Edges added to the list of a line in one portion of the planning.
 const TAKEN: u16 = 32;
+/// Edges of that list whose crossings are computed in one portion.
 const MET: u8 = 2;
-/// Portions of a line whose edges are taken in.
+/// Most portions of a line after its edges are listed.
 const PORTIONS_MAX: usize = CROSSINGS_MAX / MET as usize + 2;
 
 /// The next task on a line.

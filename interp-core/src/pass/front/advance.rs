@@ -20,13 +20,15 @@ use crate::pass::front::side::{Direction, SideCursor};
 use crate::pass::front::spline;
 use crate::pass::front::table::{Column, Table, UNMEASURED};
 
-/// Rounds in which a front is lowered where its curve is too far between the stations, and after the crests are measured.
+/// Most rounds in which a front is lowered because its curve is too far between the stations.
 const ROUNDS: u8 = 4;
+/// Most rounds in which the crests are measured and the front is lowered.
 const MEASUREMENTS: u8 = 3;
-/// Ratio of the steps up to which a straight front stays straight, and how much longer its step is: all of the limit but for an error.
+/// Ratio of the greatest to the least step up to which the front after a straight one stays straight.
 const LEVEL: f32 = 1.002;
+/// Factor on the step of a front that stays straight: it uses the whole limit but for an error.
 const LEVEL_MORE: f32 = 1.0034;
-/// Rows of a sweep in one portion, and places that are passed over.
+/// Rows of a sweep, or places without a crest, in one portion.
 const CHUNK: u16 = 16;
 /// Greatest slope.
 const SLOPE_MAX: f32 = 1e9;
@@ -71,12 +73,12 @@ enum Task {
     Done,
 }
 
-/// What has been made.
+/// Result of making a front.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Made {
     /// A front with a part before the boundary.
     Front,
-    /// A straight one, too short for its stations or beside a point: the line at this distance from the first one.
+    /// A straight front, too short for its stations or beside a point: the line at this distance from the first one.
     Line(i32),
     /// Every station is at the boundary or beyond it.
     Beyond,

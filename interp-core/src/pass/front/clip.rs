@@ -1,6 +1,6 @@
 //! The intervals of a front within a cell of a region.
 //!
-//! An edge crosses the front where one of its ends is below the front and the other is not, and there are pairs of crossings where the front bends. So an edge is gone along
+//! An edge crosses the front where one of its ends is below the front and the other is not, and there are pairs of crossings where the front bends. So an edge is followed
 //! piece by piece, each within one interval between stations: between the piece's ends and the places where the front's height over the edge has an extremum, a change of
 //! side is one crossing, found by bisection. A vertex is below the front for both of its edges or for none, so that the number of crossings is even.
 
@@ -20,14 +20,16 @@ use crate::sample::SpanParameter;
 const PLACE_BITS: u32 = FRACTION_BITS;
 /// Shift to a place within an interval in units of 2^-31.
 const WITHIN_SHIFT: u32 = 31 - PLACE_BITS;
-/// Edges of a portion whose extent is taken, and stations whose distance is.
+/// Edges in a portion that determines the extent of the cell.
 const EXTENT_EDGES: u16 = 64;
+/// Stations in a portion that determines the least and the greatest distance of the front.
 const WINDOW_STATIONS: u16 = 24;
-/// Work of a portion on edges: that of an edge which the front does not reach is 1.
+/// Work of a portion on edges, in units of an edge that the front does not reach.
 const PORTION: u16 = 64;
+/// Work of one piece of an edge, in the same units.
 const PIECE: u16 = 32;
 
-/// What is looked at.
+/// Stage of the search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stage {
     Idle,

@@ -9,8 +9,9 @@ use crate::math::number::Bounded;
 use crate::pass::front::side::{UNIT, WHOLE};
 use crate::pass::front::table::{Column, Table};
 
-/// Greatest turn from interval to interval, rad: towards the next front and away from it.
+/// Greatest turn from interval to interval towards the next front, rad.
 const TURN: f32 = 0.10;
+/// Greatest turn from interval to interval away from the next front, rad.
 const TURN_BACK: f32 = 0.15;
 /// Unit of the hull's ordinates: bits that are dropped of the front's.
 const HULL_BITS: u32 = 6;

@@ -14,10 +14,10 @@ use crate::sample::SpanParameter;
 /// Stations of a portion.
 const CHUNK: u8 = 8;
 
-/// What is looked at.
+/// Stage of the search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stage {
-    /// Nothing, or what was found is taken.
+    /// No search is under way, and no result is left.
     Idle,
     /// Stations beyond the boundary, before the part.
     Before,

@@ -16,8 +16,9 @@ use crate::pass::route::Route;
 use crate::sample::SpanParameter;
 use in_region::InRegion;
 
-/// Cycles of the planning in a period of 1 ms, a share of the period; never less than one portion, nor more than in 1 ms.
+/// Cycles for making fronts in a period of 1 ms or more; a shorter period has its share, at least one portion.
 const PORTION_CYCLES: f32 = 23_500.0;
+/// Period to which [`PORTION_CYCLES`] refers, s.
 const PORTION_PERIOD_S: f32 = 1e-3;
 /// Most portions of a period.
 const PORTIONS_MAX: u8 = 8;

@@ -155,7 +155,7 @@ impl SideCursor {
         cursor
     }
 
-    /// Width of a span other than the last, whose width is what is left.
+    /// Width of a span, units of the fronts; the last span has the rest of the whole.
     fn width_of(&self, job: &Job<'_>, span: u16) -> i32 {
         if span + 1 >= job.header.side_spans {
             return WHOLE.saturating_sub(self.start).max(1);

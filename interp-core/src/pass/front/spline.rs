@@ -67,7 +67,7 @@ impl Cubic {
         fine(self.start).wrapping_add(rise >> (31 + self.shift).saturating_sub(FINE_BITS))
     }
 
-    /// The same in units of the front.
+    /// The distance at a place within the interval (units of 2^-31), units of the front.
     pub(crate) fn value(&self, at: i32) -> i32 {
         coarse(self.fine(at))
     }

@@ -1,4 +1,4 @@
-//! From pass to pass: what is planned for the next one while the tool is on this one, and its begin.
+//! From pass to pass: the planning of the next pass while the tool is on the current one, and the begin of the next pass.
 
 use super::Run;
 use super::ahead::Prepared;
@@ -347,7 +347,7 @@ impl Run {
         self.rows_ahead(job, side)
     }
 
-    /// The same for the look-ahead of a job with limits, over the next pass at this side parameter.
+    /// The rows that the look-ahead of a job with limits needs over the next pass, at this side parameter; `None` for curved passes, which are not streamed.
     pub(crate) fn rows_ahead(&self, job: &Job<'_>, side: SpanParameter) -> Option<RowsNeeded> {
         match &self.planning {
             PassPlanning::Scan(scan) => Some(scan.estimator_ref().rows_needed(job, side)),

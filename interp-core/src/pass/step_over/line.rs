@@ -90,12 +90,13 @@ pub(super) struct NeighbourLine {
     pub(super) span: u16,
     pub(super) spans: u16,
     pub(super) side: SpanParameter,
-    /// Distance of the farther line from the pass, in the side parameter, and the inverse square interval from which it was chosen.
+    /// Distance of the farther line from the pass, in the side parameter.
     pub(super) distance: f32,
+    /// Inverse square interval by which that distance was chosen.
     pub(super) placed_for: f32,
     /// The farther line is at the surface's boundary.
     pub(super) is_at_boundary: bool,
-    /// It was placed again after the start of the pass: what is beside it before that was not seen.
+    /// The line was placed again after the start of the pass, so the stations before that place were not evaluated on it.
     is_late: bool,
     /// Inverse square interval on the line.
     pub(super) peak: Peak,

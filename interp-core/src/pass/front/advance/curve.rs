@@ -1,4 +1,4 @@
-//! The curve through the next front's stations: compared with the steps between them, lowered, and looked at for bends.
+//! The curve through the next front's stations: compares it with the steps between the stations, lowers it, and checks its bends.
 
 use core::ops::DerefMut;
 
@@ -11,8 +11,9 @@ use crate::pass::front::side::UNIT;
 use crate::pass::front::spline::Cubic;
 use crate::pass::front::table::{Column, Table};
 
-/// Turn of the curve beyond which a front is not taken, as a multiple of the limit by length, and between stations, rad.
+/// Greatest turn per length of an accepted front, as a multiple of the limit.
 const SHARP: f32 = 2.5;
+/// Greatest turn of an accepted front between stations, rad.
 const SHARP_TURN: f32 = 0.5;
 /// Tolerance of the curve between stations, over the step there.
 const MIDDLE_TOLERANCE: f32 = 1.0005;
@@ -54,7 +55,7 @@ impl Advance {
         beyond
     }
 
-    /// Lowers a station by what was measured beside it.
+    /// Lowers a station by the excess measured beside it.
     pub(super) fn lower<W: DerefMut<Target = [i32]>>(&self, table: &mut Table<W>, station: u16) {
         let by = table.word(Column::Scratch, station);
         if by > 0 {

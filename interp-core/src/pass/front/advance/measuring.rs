@@ -11,16 +11,21 @@ use crate::pass::front::side::UNIT;
 use crate::pass::front::spline::Cubic;
 use crate::pass::front::table::{Column, Table, UNMEASURED};
 
-/// Share of the limit to which the crests of a straight front are measured; by how much more than the excess a front is lowered, and how many times as much after the last measurement.
+/// Greatest scallop height beside a straight front, as a share of the limit.
 const LEVEL_MARGIN: f32 = 0.9999;
+/// A front is lowered by this many times the excess of its crests.
 const LOWER: f32 = 1.1;
+/// Factor on the excess after the last measurement, because the lowered front is not measured again.
 const LAST: i32 = 2;
-/// Places in each interval at which crests are measured, and the bend of a front over an interval above which all of them are, as a share of the step there: of short intervals, and of long ones.
+/// Places in each interval at which crests may be measured; in an interval that is not bent, the middle alone.
 const PLACES: u16 = 4;
+/// Bend of a front over an interval from which the interval counts as bent, as a share of the step there.
 const BENT: f32 = 0.06;
+/// [`BENT`] of a pass with half the stations (`Advance::is_coarse`).
 const BENT_COARSE: f32 = 0.02;
-/// Scallop height to which the crests are measured, as a share of the limit: between places near each other, and farther apart.
+/// Greatest measured scallop height, as a share of the limit: crests between the places are higher.
 const MEASURED_MARGIN: f32 = 0.990;
+/// [`MEASURED_MARGIN`] of a pass with half the stations.
 const MEASURED_MARGIN_COARSE: f32 = 0.983;
 /// Intervals on either side of a crest that is too high whose crests are measured again.
 const BESIDE: u16 = 2;
@@ -64,7 +69,7 @@ impl Advance {
         }
     }
 
-    /// Whether the front is bent so much in an interval that its middle alone does not tell the crest.
+    /// Whether the front is bent so much in an interval that a crest away from the middle may be the highest.
     fn is_bent<W: DerefMut<Target = [i32]>>(&self, job: &Job<'_>, table: &Table<W>, station: u16) -> bool {
         let length = self.stations.length(job, station);
         let [front, next] = [CURRENT, NEXT].map(|columns| Cubic::of(table, columns, station, length));
@@ -93,7 +98,7 @@ impl Advance {
         is_before(low) || is_before(high)
     }
 
-    /// Passes over places at which no crest is to be measured. Whether it came to one where it is.
+    /// Passes over places at which no crest has to be measured. Returns whether it has found one at which a crest has to be.
     pub(super) fn finds_crest<W: DerefMut<Target = [i32]>>(
         &mut self,
         job: &Job<'_>,
@@ -127,7 +132,7 @@ impl Advance {
         let Some(excess) = self.search.work(&mut tools, table, margin) else {
             return;
         };
-        // What the last measurement lowers is not measured again.
+        // A front that the last measurement lowers is not measured again.
         let is_last = self.measured + 1 >= MEASUREMENTS;
         let excess = if is_last {
             excess.saturating_mul(LAST)

@@ -17,11 +17,14 @@ use crate::sample::SpanParameter;
 
 /// Points on the first line and on the last one by which the pass's length is measured.
 const LENGTH_POINTS: u16 = 9;
-/// Shortest interval between stations, in periods at the feed and in step-overs: of a pass that lasts for fewer periods at the feed within axis limits, and of others. A front of 64
-/// intervals is made in some 300 periods, the plan of a pass in as many, and the pass is slowed to both.
+/// Shortest interval between stations, in periods at the feed.
 const INTERVAL_PERIODS: f32 = 2.0;
+/// Shortest interval between stations, in step-overs.
 const INTERVAL_STEPS: f32 = 0.5;
+/// [`INTERVAL_STEPS`] of a pass shorter than [`SHORT_PERIODS`].
 const INTERVAL_STEPS_SHORT: f32 = 2.0;
+/// Duration at the feed, in periods, below which a pass within axis limits has fewer stations: a front of 64 intervals is made in some 300 periods, the plan of a pass in as
+/// many, and the pass is slowed to both.
 const SHORT_PERIODS: f32 = 1_000.0;
 /// Greatest turn of a pass in one period, rad.
 const TURN_PER_PERIOD: f32 = 0.05;
