@@ -133,11 +133,12 @@ fn small_job_passes_the_verifier() {
     }
 }
 
-/// Greatest share of a jerk limit, and of the feed as its deviation, %.
+/// Greatest use of a jerk limit, 1 = at the limit.
 const JERK_MOST: f64 = 1.02;
+/// Greatest deviation from the feed, %.
 const RIPPLE_PCT: f64 = 0.001;
 
-/// What of a run at this scallop height and feed is beyond its bounds: the axis limits, the feed.
+/// The bound that a run at this scallop height and feed breaks, of the axis limits and the feed, in words; `None` if it keeps them.
 fn beyond(name: &str, start: Start, scallop_mm: f64, feed_mm_min: f64) -> Option<String> {
     let mut job = curved(name, start, Pattern::Zig, feed_mm_min);
     job.scallop_mm = scallop_mm;

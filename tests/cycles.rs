@@ -499,7 +499,7 @@ fn no_stage_has_grown() {
     });
 }
 
-/// The same for the worst-case ticks that searches have found.
+/// The worst-case ticks that searches have found take no more cycles than in the golden table.
 #[test]
 fn the_worst_ticks_have_not_grown() {
     check_growth(|_| (golden::worst_ticks(images::setup()).unwrap(), Vec::new()));
@@ -542,7 +542,7 @@ fn a_short_search_with_limits_finds_no_tick_over_its_budget() {
     check_search(2, class);
 }
 
-/// The same of curved passes in a region, within axis limits.
+/// A short search of curved passes in a region, within axis limits.
 #[test]
 fn a_short_search_of_curved_passes_finds_no_tick_over_its_budget() {
     let class = JobClass {

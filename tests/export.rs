@@ -278,7 +278,7 @@ fn of_linear(job: &Job) -> Bounds {
     }
 }
 
-/// The same without the speed on parts of a chord: beside a point the centre turns by much within one, and the contact does not follow evenly.
+/// The bounds of linear programs without the speed on parts of a chord: beside a point the centre turns far within one chord, so the contact's speed varies.
 fn only_mean(job: &Job) -> Bounds {
     Bounds {
         eighth: f64::INFINITY,

@@ -97,7 +97,7 @@ fn ball_in_a_valley_that_is_too_tight() {
     assert_eq!(core.tick(Command::Start).tick, 0);
 }
 
-/// The same valley across the passes: the other principal direction.
+/// A valley along the passes: the other principal direction bounds the ball.
 #[test]
 fn ball_in_a_valley_along_the_pass() {
     let surface = patch(&[

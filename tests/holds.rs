@@ -80,7 +80,7 @@ fn holds(name: &str, feed_mm_min: f64, pattern: Pattern, overrun_mm: f64, count:
     holds
 }
 
-/// The part of a sorted list up to which so many of it are.
+/// The value at share `part` of a sorted list; 0 of an empty list.
 fn quantile(sorted: &[u32], part: f64) -> u32 {
     #[allow(
         clippy::cast_precision_loss,
@@ -132,10 +132,11 @@ fn all_holds(jobs: &[(&str, &[f64])], count: usize) -> [Vec<u32>; 2] {
     all
 }
 
-/// Nine of ten holds stand within this, and all, periods of 1 ms.
+/// Longest time from a hold to standstill of nine in ten holds, periods of 1 ms.
 const NINE_OF_TEN: u32 = 250;
+/// Longest time from a hold to standstill of all holds, periods of 1 ms.
 const WORST: u32 = 400;
-/// Periods within which a resumed run moves, and one that is started has planned its first pass.
+/// Longest time, in periods, until a resumed run moves, or a started one, whose first pass has to be planned.
 const RESUMES: u32 = 1200;
 
 #[test]

@@ -51,7 +51,7 @@ const WANTED: [(&str, f64, [f64; 2]); 12] = [
     ("ruled_printed", 6000.0, [162.0, 152.0]),
 ];
 
-/// Rows that miss what was asked (`docs/figures.md` tells why), and what they hold, s.
+/// Rows that miss the wanted times (`docs/figures.md` tells why), and the times that they keep, s.
 const MISSED: [(&str, f64, [f64; 2]); 2] = [
     ("freeform", 3600.0, [225.5, 214.9]),
     ("freeform", 6000.0, [175.0, 165.9]),

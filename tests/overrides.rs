@@ -5,11 +5,13 @@ use interp_core::{Command, Inputs, State};
 use job::{AxisLimits, Pattern};
 use machine::prepare::prepare;
 
-/// Periods within which an override begins, and those that are followed.
+/// Longest delay of an override, periods.
 const AT_ONCE: usize = 20;
+/// Number of periods in which the beginning of an override is searched.
 const FOLLOWED: usize = 300;
-/// Share of the feed that a place has where nothing but the feed limits it, and for how many periods.
+/// Share of the programmed feed from which the tool counts as moving at the feed.
 const AT_FEED: f32 = 0.999;
+/// Number of periods for which it must stay at the feed.
 const STAYS: usize = 200;
 /// Share of the feed that is rounding.
 const ROUNDING: f32 = 1e-5;
@@ -17,11 +19,11 @@ const ROUNDING: f32 = 1e-5;
 /// When overrides began, periods.
 #[derive(Default)]
 struct Begins {
-    /// Of overrides below the last one.
+    /// Overrides below the last one.
     slower: Vec<usize>,
-    /// Of those above, at the programmed feed and for some time after, and elsewhere.
+    /// Overrides above the last one, at places where the tool moves at the feed and stays so.
     at_feed: Vec<usize>,
-    /// Where the axes limit the motion.
+    /// Overrides above the last one, at places where the axes limit the motion.
     at_limit: Vec<usize>,
 }
 

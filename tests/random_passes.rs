@@ -23,8 +23,9 @@ const LIMITS: AxisLimits = AxisLimits {
 const SURFACES: usize = 24;
 /// Passes that are compared: the first, which is planned at rest, and one that is planned while another runs.
 const PASSES: [u32; 2] = [0, 3];
-/// Share of the ball's radius in the size of a patch, and of the scallop limit in the radius.
+/// Ball radius as a share of the size of a patch.
 const RADIUS: f64 = 0.04;
+/// Scallop limit as a share of the ball radius.
 const SCALLOP: f64 = 0.3;
 /// A pass whose optimum is shorter than this waits for its planning (`README.md`, "Not supported"), s.
 const PLANNED_S: f64 = 0.25;

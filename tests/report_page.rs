@@ -451,7 +451,7 @@ fn marks_links_and_the_machine_are_drawn() {
     browser.value("document.querySelector('#marks button').click()");
     let tick = browser.value("isofeedReport.panel.tick");
     assert_eq!(tick.as_f64(), Some(9000.0));
-    // Without what was switched off there is less of it.
+    // With the marks switched off, fewer pixels are red.
     let with = pixels(&mut browser, bad)[2];
     click(&mut browser, "show-marks");
     let without = pixels(&mut browser, bad)[2];

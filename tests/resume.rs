@@ -90,7 +90,7 @@ impl Bench {
         bench
     }
 
-    /// The power fails: what was not put out yet never is.
+    /// Cuts the power: pulses that are not emitted yet are lost.
     pub(crate) fn cut(self, slowly: bool) -> Self {
         let board = if slowly {
             self.board.power_cycle_slowly()
@@ -287,7 +287,7 @@ fn again_max_mm(job: &Job) -> f64 {
     job.feed_mm_s() * 0.155 + 0.55
 }
 
-/// The worst of what was machined again, mm, after cuts with and without time for a record.
+/// Longest way machined again, mm, after cuts with and without time for a record.
 #[derive(Debug, Default)]
 struct Again {
     with_mm: f64,
@@ -371,7 +371,7 @@ fn a_run_is_complete_after_power_cuts_at_random_ticks() {
     }
 }
 
-/// A run that was cut short is no place of another job, or of another profile: what is journalled stays its own.
+/// A journalled place counts only for the job and the profile that ran.
 #[test]
 fn a_place_is_of_the_job_and_the_profile_that_ran() {
     let jobs = [Pattern::Zigzag, Pattern::Zig].map(|pattern| sample_job("torus", pattern, 0.0, None));

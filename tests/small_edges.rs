@@ -83,7 +83,7 @@ fn fillet(radius: f64, angle: f64, handles: &[f64]) -> Profile {
     Profile { knots, poles }
 }
 
-/// The same behind this many straight pieces of a length.
+/// A fillet behind `flats` straight pieces of a length.
 fn behind_flats(flats: usize, length: f64, fillet: &Profile) -> Profile {
     let mut poles: Vec<_> = (0..3 * flats)
         .map(|k| [(k as f64 / 3.0 - flats as f64) * length, 0.0])
@@ -148,8 +148,8 @@ fn passes_around_small_edges() {
     assert!(off.is_empty(), "{off}");
 }
 
-/// Where a pass has so many patches that two cells are kept of each, a bend of patches of 0.3 mm is looked at in four all the same: by two, of one second
-/// derivative, it used 2.5 of the jerk limit on a face of a part.
+/// A pass of many patches keeps two cells of each patch; in a bend, patches of 0.3 mm are still evaluated in four cells. With two, which share one second derivative, the jerk
+/// was 2.5 times its limit on a face of a part.
 #[test]
 fn limits_hold_in_a_bend_of_many_patches() {
     for (radius, handles) in [

@@ -74,7 +74,7 @@ impl<'a> Streamed<'a> {
         }
     }
 
-    /// Sends words, at most this number, and checks what is complete. Whether any could be sent.
+    /// Sends at most `most` words, and checks the records that are complete. Returns whether any word could be sent.
     fn send(&mut self, most: usize) -> bool {
         let [received, limit] = self.core.load_room();
         let (from, to) = (received as usize, (limit as usize).min(received as usize + most));

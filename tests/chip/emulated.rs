@@ -9,11 +9,13 @@ use std::time::{Duration, Instant};
 use boards::{Axis, Board, Level, Line, Role, SKR_PRO, STM32F405};
 use serde_json::Value;
 
-/// Cycles of the core clock per microsecond: during a run, and directly after a reset.
+/// Cycles of the core clock per microsecond during a run.
 pub(super) const CYCLES_US: u64 = 168;
+/// Cycles of the core clock per microsecond directly after a reset.
 pub(super) const RESET_CYCLES_US: u64 = 16;
-/// Cycles of a sampling period, and of a byte on the line at 921 600 baud.
+/// Cycles of a sampling period.
 pub(super) const PERIOD: u64 = 1_000 * CYCLES_US;
+/// Cycles of a byte on the line at 921 600 baud.
 const BYTE: u64 = 1_820;
 /// Time after a reset within which every output must be at rest, us.
 pub(super) const REST_US: u64 = 100;

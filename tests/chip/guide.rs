@@ -16,7 +16,7 @@ use boards::SKR_PRO;
 
 use super::emulated::{Emulated, tool, workspace};
 
-/// Longest wait for what is to be seen: the machine may be busy, and the chip then slower than real time.
+/// Longest wait for expected output: on a busy computer the chip is slower than real time.
 const PATIENCE: Duration = Duration::from_secs(240);
 
 /// Interval of a terminal's key repeat.

@@ -61,7 +61,7 @@ impl Kept {
     }
 }
 
-/// An operation, and what is kept after it.
+/// An operation, and its effect on the kept jobs and journal.
 struct Operation<'a> {
     what: &'static str,
     does: &'a dyn Fn(&mut Session) -> Result<(), RemoteError>,

@@ -205,7 +205,7 @@ impl Way {
         around.filter(near).min_by_key(|index| apart(index)).copied()
     }
 
-    /// Those of the way's places that a track passes, in order, from the first time on at which it is above all passes: before, a run leaves the place of the last one.
+    /// Indices of the way's places that a track passes, ascending, from the first time at which it is above all passes: before that, a run leaves the place of the last run.
     fn passed(&self, track: &[(u64, [i32; 3])]) -> Vec<usize> {
         let begin = track.iter().position(|(_, at)| at[2] > self.above);
         let track = begin.map_or(&[][..], |begin| &track[begin..]);

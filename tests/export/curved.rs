@@ -55,7 +55,7 @@ fn curved_passes_hold_the_tolerances() {
     }
 }
 
-/// The same of random difficult surfaces, those that the core machines and that face up.
+/// Exported curved passes of random difficult surfaces keep the tolerances, where the core machines the surface and it faces up.
 #[test]
 fn curved_passes_of_random_surfaces_hold_the_tolerances() {
     let mut checked = 0;

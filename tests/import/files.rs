@@ -68,7 +68,7 @@ fn hostile_files() {
     assert!(missing.what.contains("cannot read"), "{missing}");
 }
 
-/// Warnings of an IGES file name the directory entries of what was not read, as the list names those of faces.
+/// Warnings of an IGES file name the directory entries that were not read, as the list of faces does.
 #[test]
 fn warnings_name_the_entry() {
     let warnings = read(&cad("swept.igs")).unwrap().warnings;

@@ -43,7 +43,7 @@ fn a_run_in_qemu_stays_the_same() {
     }
 }
 
-/// Sample by sample: QEMU is faster than the host asks, so some of what is lost comes again and some is proven by the digest.
+/// Compared sample by sample: QEMU is faster than the host asks, so some lost events are sent again, and the digest proves the others.
 #[test]
 fn the_samples_of_a_run_in_qemu_stay_the_same() {
     let bench = dome();

@@ -121,7 +121,7 @@ fn any_burst_of_lost_events_leaves_a_run_the_same() {
     }
 }
 
-/// The same for a run within limits, with links and planning.
+/// A run within limits, with links and planning, gives the same samples whichever event is lost.
 #[test]
 fn a_run_within_limits_stays_the_same() {
     let bench = dome_with_limits();

@@ -182,15 +182,15 @@ pub struct Mock {
     pub unsafe_because: Option<Reason>,
     /// Whether its inputs are simulated, because it has no pins.
     pub simulated: bool,
-    /// How often it heard a sign of life of the host.
+    /// Number of signs of life of the host.
     pub heard: u32,
-    /// The profile that it keeps.
+    /// The kept profile.
     pub profile: Option<Profile>,
-    /// The work offsets that it keeps.
+    /// The kept work offsets.
     pub offsets: Offsets,
-    /// Its journal.
+    /// The kept journal.
     pub journal: Option<Journal>,
-    /// It keeps no jobs, and has no place for any.
+    /// A job store without room for any job.
     pub jobs: JobStore<RamFlash<0>>,
 }
 

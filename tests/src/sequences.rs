@@ -13,13 +13,15 @@ use machine::prepare::{Prepared, prepare};
 /// The core, with a store of the job's size.
 pub type Core = Interpolator<Vec<i32>>;
 
-/// Periods between the places of a run from which sequences start, and those of a long job that they start from, before its end.
+/// Periods between the places of a run from which sequences start.
 const EVERY: usize = 23;
+/// Last periods of a long job, from which sequences start.
 const LAST: usize = 3000;
 /// Of these places, how many lie just before the first pass.
 const APPROACHES: usize = 4;
-/// Periods after the last command within which a run has ended, and equal samples in contact that are none of a stand.
+/// Periods after the last command within which a run must end.
 const ENDS: usize = 60_000;
+/// Largest number of equal samples in contact that are no standstill.
 const STANDS: u32 = 4;
 /// Override below which a tool that moves may seem to stand, %.
 const SLOW: u8 = 20;
@@ -181,7 +183,7 @@ impl Course {
         Self::new(&name, header, &words)
     }
 
-    /// Curved passes in a region of a twisted surface of so many patches along them, reached straight.
+    /// Curved passes in a region of a twisted surface with `patches` patches along a pass; links go straight.
     #[must_use]
     pub fn of_region(patches: u32, region: &str) -> Self {
         let inner: Vec<f64> = (0..=patches)
@@ -313,7 +315,7 @@ impl Outcome {
     }
 }
 
-/// A run under commands, and what is checked of it.
+/// A run under commands, with the state of its checks.
 struct Run<'a> {
     course: &'a Course,
     core: Core,
@@ -460,10 +462,10 @@ impl Course {
         Ok(run.outcome)
     }
 
-    /// What comes of some steps from the place of the undisturbed run at this tick.
+    /// Outcome of some steps from the place of the undisturbed run at this tick.
     ///
     /// # Errors
-    /// What they break, or that there is no such place.
+    /// The broken rule; or sequences do not start at that place.
     pub fn run_from(&self, tick: u32, steps: &[Step]) -> Result<Outcome, String> {
         let start = self.starts.iter().find(|start| start.sample.tick == tick);
         self.run(start.ok_or("no such place")?, steps)
@@ -557,7 +559,7 @@ impl Run<'_> {
     }
 }
 
-/// Runs the sequences of some seeds on all cores; what came of them, and what was broken.
+/// Runs the sequences of some seeds on all cores. Returns their outcome, and the broken rules in words.
 #[must_use]
 pub fn run_all(courses: &[Course], seeds: std::ops::Range<u64>) -> (Outcome, Vec<String>) {
     use std::sync::Mutex;

@@ -16,7 +16,7 @@ fn job(cut: usize, patches: [usize; 2], region: Region) -> Job {
     job
 }
 
-/// The same with the region's cells.
+/// The job with its region divided into cells.
 pub(super) fn in_cells(cut: usize, patches: [usize; 2], region: Region) -> Job {
     let (job, _) = direction::choose(job(cut, patches, region)).unwrap();
     assert!(job.region.as_ref().unwrap().cells.len() > 1);

@@ -19,7 +19,7 @@ mod tests {
     use super::*;
     use std::path::Path;
 
-    /// The seeds get as far as what is fuzzed goes: a mutation of what is refused at once finds nothing.
+    /// Every seed passes through all of the fuzzed code: mutations of an input that is refused at once would find nothing.
     #[test]
     fn seeds_go_all_the_way() {
         let seeds = Path::new(env!("CARGO_MANIFEST_DIR")).join("seeds");
