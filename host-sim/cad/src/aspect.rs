@@ -9,7 +9,7 @@ const PATCHES_MAX: usize = 512;
 /// Places of a patch, along and across, at which it is measured.
 const SHARES: [f64; 3] = [0.02, 0.5, 0.98];
 
-/// The same surface with knots between which no patch is much longer than wide; `None` where none is, or where that would take too many.
+/// The surface with further knots, so that no patch is much longer than wide; `None` where no patch is, or where that would take more than [`PATCHES_MAX`] patches.
 #[must_use]
 pub(super) fn with_even_patches(spline: &SplineSurface) -> Option<SplineSurface> {
     let knots = [dividing(spline, 0)?, dividing(spline, 1)?];

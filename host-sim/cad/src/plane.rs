@@ -15,9 +15,9 @@ use super::{Boundary, Edge, Face, Outline};
 const FOLLOWS_MM: f64 = 1e-3;
 /// Edges whose directions differ by less are parallel, rad.
 const PARALLEL_RAD: f64 = 1e-4;
-/// The radius goes down to this share of the inner one: what is around a face does not reach its centre, where the circles end.
+/// Least radius of the parameters, as a share of the face's inner radius: the surface around the face must not reach the centre, where the circles end.
 const INNER_SHARE: f64 = 0.05;
-/// How far the radius goes beyond the outer one, in outer radii.
+/// Greatest radius of the parameters beyond the face's outer radius, in outer radii.
 const OUTER: f64 = 2.0;
 
 /// A circle.

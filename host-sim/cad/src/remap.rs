@@ -12,7 +12,7 @@ const BISECTIONS: usize = 60;
 
 /// How one parameter maps.
 enum Map<'s> {
-    /// As it is.
+    /// The parameter stays.
     Same,
     /// An angle, over arcs with these knots.
     Angle(Vec<f64>),

@@ -242,7 +242,7 @@ impl SplineCurve {
         self.poles.iter().any(|pole| pole[3] != self.poles[0][3])
     }
 
-    /// The same the other way round, on the same range.
+    /// The curve in the opposite direction, on the same range.
     pub(super) fn reversed(&self) -> Self {
         let [start, end] = self.axis.domain();
         Self {
@@ -260,7 +260,7 @@ impl SplineCurve {
         }
     }
 
-    /// The same curve with this degree, at least its own: each span is raised by itself (P&T 5.5).
+    /// This curve with a degree of at least its own: each span is raised separately (P&T 5.5).
     pub(super) fn raised(&self, degree: usize) -> Self {
         let mut curve = self.clone();
         while curve.axis.degree < degree {

@@ -418,8 +418,8 @@ impl Surface {
     }
 }
 
-/// A surface at many points, with what is the same at all of them: whether a B-spline is closed takes dozens of points. Parameters may lie beyond the seam
-/// of a closed B-spline, one period further: its polynomials end there.
+/// A surface for evaluation at many points: domain and periods are computed once, because dozens of points decide whether a B-spline is closed. Parameters may lie up to one
+/// period beyond the seam of a closed B-spline, whose polynomials end there.
 pub struct Periodic<'s> {
     pub(super) surface: &'s Surface,
     /// Ranges of u and v; `None` if unbounded.

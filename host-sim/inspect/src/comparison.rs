@@ -281,7 +281,7 @@ mod tests {
         verdict_without(0, status, first_difference, commanded)
     }
 
-    /// The same where this number of samples did not come.
+    /// The verdict on a board's run of which `missing` samples did not arrive.
     fn verdict_without(
         missing: u64,
         status: Status,

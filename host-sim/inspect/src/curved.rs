@@ -20,7 +20,7 @@ const END_SHARE: f64 = 1e-6;
 pub struct PathFigures {
     /// Number of passes.
     pub passes: usize,
-    /// Those of them that do not go from one end of the path parameter to the other.
+    /// Number of passes that do not go from one end of the path parameter to the other.
     pub partial: usize,
     /// Length of all passes at the contact, mm.
     pub length_mm: f64,
@@ -33,12 +33,12 @@ pub struct PathFigures {
 pub struct CurvedFigures {
     /// The job's path.
     pub own: PathFigures,
-    /// That of straight passes along the same parameter; `None` where the core does not machine the job so.
+    /// The path of straight passes along the same parameter; `None` where the core does not machine the job with these.
     pub straight: Option<PathFigures>,
 }
 
 impl CurvedFigures {
-    /// What is saved of the length and of the time of straight passes, as shares; negative where more is needed.
+    /// Saved shares of the length and of the time of straight passes; negative where curved passes need more.
     #[must_use]
     pub fn saved(&self) -> Option<[f64; 2]> {
         let straight = self.straight?;
@@ -58,7 +58,7 @@ pub fn path_figures(job: &Job, prepared: &Prepared) -> Result<PathFigures, Inspe
     follow(job, prepared, &Oracle::new(job)?, &mut |_| ())
 }
 
-/// The same, and the crests that the passes leave, from samples at least this far apart.
+/// Runs a job on the core and measures its path ([`path_figures`]) and the crests that the passes leave, from samples at least this far apart.
 ///
 /// # Errors
 /// As [`path_figures`].

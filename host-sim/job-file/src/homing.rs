@@ -172,7 +172,7 @@ pub(super) fn read_door(door: &Section<'_>) -> Result<Contact, JobError> {
     contact(door, "contact")
 }
 
-/// What a contact does when what it reports happens.
+/// Reads the kind of a contact.
 pub(super) fn contact(section: &Section<'_>, key: &str) -> Result<Contact, JobError> {
     let kinds = [
         ("normally-closed", Contact::NormallyClosed),

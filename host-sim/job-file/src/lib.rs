@@ -41,8 +41,8 @@ pub use file::{
 pub use program::jobs_of;
 pub use steps::slots_max_us;
 
-/// How far the surface of a face goes on beyond it, in step-overs on a plane: passes begin and end half a step-over beside it, which on concave places
-/// is twice as long.
+/// Distance by which the surface of a face extends beyond the face, in step-overs on a plane: passes begin and end half a step-over beside the face, and a step-over on a
+/// concave place is up to twice as long.
 pub const STEP_OVERS_AROUND: f64 = 1.1;
 
 /// Reads a job without a surface of `kind = "file"` from a file.

@@ -115,7 +115,7 @@ pub struct Homing {
 pub struct Spindle {
     /// Speed, 1/min; 0: the spindle stands.
     pub rpm: u32,
-    /// It turns counterclockwise.
+    /// The spindle turns counterclockwise.
     pub counterclockwise: bool,
     /// Coolant.
     pub coolant: bool,
@@ -124,9 +124,9 @@ pub struct Spindle {
 /// A contact of the machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Contact {
-    /// It opens when what it reports happens.
+    /// The contact opens when the reported event happens.
     NormallyClosed,
-    /// It closes then.
+    /// The contact closes when the reported event happens.
     NormallyOpen,
 }
 
@@ -135,11 +135,11 @@ pub enum Contact {
 pub struct SpindleDrive {
     /// Speed at the full output, 1/min.
     pub max_rpm: u32,
-    /// Time from switching on to the first motion, ms; with a contact that reports the speed, after which its silence is a fault.
+    /// Time from switching on to the first motion, ms; with a contact that reports the speed, the longest wait for that report, after which there is a fault.
     pub at_speed_ms: f64,
-    /// It is switched off while the tool is lifted for a pause.
+    /// The spindle is switched off while the tool is lifted for a pause.
     pub stops_at_pause: bool,
-    /// The contact that reports that it is at speed.
+    /// The contact that reports that the spindle is at speed.
     pub at_speed: Option<Contact>,
 }
 

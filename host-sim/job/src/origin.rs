@@ -56,10 +56,10 @@ pub enum StartChoice {
 /// The parameters of a face of a CAD file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum FaceParameters {
-    /// Along the four edges of the face, which are then those of the surface; where it has no such edges, as [`Self::Surface`].
+    /// Along the four edges of the face, which then are the edges of the job's surface; a face without four edges: as [`Self::Surface`].
     #[default]
     Edges,
-    /// Those of its surface, which goes on beyond the face where there is more of it.
+    /// Parameters of the face's surface, which extends beyond the face where the CAD file's surface does.
     Surface,
 }
 
@@ -85,11 +85,11 @@ pub struct CadSource {
     pub tolerance_mm: f64,
     /// A trimmed face is machined over the rectangle that encloses it.
     pub untrimmed: bool,
-    /// Its parameters.
+    /// Choice of the face's parameters.
     pub parameters: FaceParameters,
     /// The job's surface before its placement, with the parameters of the face if it is an approximation.
     pub surface: SurfaceSpec,
-    /// How far the surface goes on beyond the face, where it has more, mm.
+    /// Distance by which the job's surface extends beyond the face where the CAD file's surface does, mm.
     pub around_mm: f64,
     /// The face is trimmed: the job's region is made from it.
     pub trimmed: bool,
@@ -102,24 +102,24 @@ pub struct CadSource {
 pub struct PartSource {
     /// The CAD file, relative to the working directory.
     pub path: PathBuf,
-    /// How deep the tool may enter it, mm.
+    /// Depth to which the tool may enter the part, mm.
     pub tolerance_mm: f64,
     /// Steepest angle of the surface from the horizontal that is machined, degrees.
     pub steepest_deg: f64,
 }
 
-/// What a tool reaches of a face.
+/// Reach of a tool over a face.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FaceReach {
     /// Area of the face, mm2.
     pub area_mm2: f64,
-    /// What of it the tool reaches, mm2.
+    /// Area that the tool reaches, mm2.
     pub reachable_mm2: f64,
-    /// What of that is in the job's region, mm2.
+    /// Reachable area within the job's region, mm2.
     pub region_mm2: f64,
-    /// What it does not reach, mm2, by the first test that failed: `steep`, `fit`, `ball`, `shank`, `holder`.
+    /// Area that the tool does not reach, mm2, by the first rule that it breaks: `steep`, `degenerate`, `fit`, `ball`, `shank`, `holder`.
     pub unreachable_mm2: Vec<(String, f64)>,
-    /// The largest ball that reaches 99 % of what is not too steep, mm; `None` if no ball above 0.05 mm does.
+    /// Radius of the largest ball that reaches 99 % of the area that is not too steep, mm; `None` if no ball above 0.05 mm does.
     pub radius_mm: Option<f64>,
     /// Highest point of the whole part, mm; `None` without one.
     pub top_mm: Option<f64>,

@@ -9,7 +9,7 @@ pub struct Region {
     /// The polygons: vertices `[u, v]`, in the parameters of the placed surface ([`crate::Job::surface`]), within its domain. The edge from the last
     /// vertex back to the first belongs to the polygon. Either sense of rotation.
     pub loops: Vec<Vec<[f64; 2]>>,
-    /// Its cells in the order in which they are machined, each as polygons as above; together they are the region. Empty where it is machined line by line.
+    /// Cells of the region in the order in which they are machined, each as polygons like `loops`; together they are the region. Empty: the region is machined line by line.
     pub cells: Vec<Vec<Vec<[f64; 2]>>>,
 }
 
@@ -26,7 +26,7 @@ impl Region {
         }
     }
 
-    /// What is machined line by line, one after the other: its cells, or all of it.
+    /// The parts that are machined one after the other, each line by line: the cells, or else the whole region.
     #[must_use]
     pub fn parts(&self) -> Vec<Self> {
         if self.cells.is_empty() {
@@ -66,12 +66,12 @@ impl Region {
     }
 }
 
-/// Share of the longest line near an end of a region from which on a line there is as good as it.
+/// A line near an end of a region is long enough to be the last one from this share of the longest line there.
 const FULL_SHARE: f64 = 0.98;
-/// Lines near an end that are looked at beside those through vertices.
+/// Lines near an end that are compared, besides those through vertices.
 const LINES_AT_END: u32 = 16;
-/// How far from an end of a region its last line may be, in step-overs of a plane: what is beyond it stays below the scallop height down to a convex
-/// radius of a tenth of the ball's.
+/// Greatest distance of the last line from an end of a region, in step-overs of a plane: the strip beyond it stays below the scallop height down to a convex radius of a
+/// tenth of the ball's.
 const END_STEPS: f64 = 0.15;
 /// Ends that are nearer to the surface's boundary than this share of the side parameter's range are on it: passes follow it.
 const ON_BOUNDARY: f64 = 1e-9;
@@ -151,7 +151,7 @@ impl Region {
         })
     }
 
-    /// What of the region lies between two lines of constant side parameter.
+    /// The part of the region between two lines of constant side parameter.
     #[must_use]
     pub fn between(&self, along: Along, [low, high]: [f64; 2]) -> Self {
         let cut = |polygon: &[[f64; 2]], side: f64, upwards: f64| {
@@ -182,7 +182,7 @@ impl Region {
 mod tests {
     use super::*;
 
-    /// An end that is slanted by less than what is looked at is cut at its lower end; a flat one, and one that is slanted more, stays.
+    /// An end that is slanted by less than [`END_STEPS`] is cut at its lower end; a flat end, and one that is slanted more, stays.
     #[test]
     fn the_last_line_is_no_sliver() {
         let region = |high: [f64; 2]| {

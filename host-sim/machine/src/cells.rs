@@ -95,7 +95,7 @@ fn without_slivers(job: &Job, region: &Region, cells: Vec<Vec<Polygon>>) -> Vec<
     if is_cut { trimmed } else { cells }
 }
 
-/// What links and passes cost.
+/// The time that links and passes take.
 struct Costs {
     surface: SurfaceEvaluator,
     along: Along,

@@ -17,9 +17,9 @@ type Ready = (Job, Prepared);
 /// Neither direction can be machined.
 #[derive(Debug)]
 pub enum DirectionError {
-    /// Neither can be prepared or loaded: the error is in the job file.
+    /// Neither direction can be prepared or loaded: the error is in the job file.
     Refused(JobError),
-    /// At least one starts; both fail.
+    /// The run starts in at least one direction, and ends in a fault in both.
     Faults(String),
 }
 
@@ -53,7 +53,7 @@ impl TrialResult {
     }
 }
 
-/// The one with less time; the first if both take the same, or neither can be machined.
+/// The trial with less time; the first one if both take the same time, or neither can be machined.
 pub(crate) fn fastest(first: TrialResult, second: TrialResult) -> TrialResult {
     let is_refused = |tried: &TrialResult| tried.trial.rejection.is_some();
     let is_faster = second.trial.ticks < first.trial.ticks || is_refused(&first);
@@ -67,7 +67,7 @@ pub(crate) fn fastest(first: TrialResult, second: TrialResult) -> TrialResult {
 /// Chooses direction and start of a job: as given in its file, or the faster of the two; u, and the edge, if both take the same time.
 ///
 /// # Errors
-/// What is given cannot be prepared, or, with `"auto"`, no choice can be machined.
+/// The job as given cannot be prepared, or, with `"auto"`, no choice can be machined.
 pub fn choose(mut job: Job) -> Result<Ready, DirectionError> {
     if !job.origin.has_to_choose() {
         cells::settle(&mut job);
@@ -160,7 +160,7 @@ fn refusal(job: &Job, key: &str, what: String, remedy: &str, started: bool) -> D
     }
 }
 
-/// Runs the job in one direction to its end, or for so many periods, with this rule for the distance between passes.
+/// Runs the job in one direction, with this spacing of the passes, to its end or for at most `ticks_max` periods.
 pub(crate) fn run_trial(job: &Job, along: Along, spacing: Spacing, ticks_max: u64) -> TrialResult {
     let mut job = job.clone();
     (job.along, job.spacing) = (along, spacing);

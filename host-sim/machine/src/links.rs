@@ -13,7 +13,7 @@ use crate::prepare::{Prepared, stream};
 pub enum Link {
     /// Straight, at the feed.
     Straight,
-    /// Around what is between, at the feed.
+    /// Around the obstacle between the passes, at the feed.
     Around(Detour),
     /// Up to this height of the ball's centre, nm, across, and down.
     Across(i32),

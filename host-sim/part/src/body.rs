@@ -11,15 +11,15 @@ use crate::inside::Inside;
 use crate::tree::{Block, Tree};
 use crate::triangle::{edge_beside, edge_nearest};
 
-/// Largest distance of a cell's two triangles from the surface, mm: what is nearer than that is decided by the cell itself.
+/// Largest distance of a cell's two triangles from the surface, mm. Distances below it are computed from the cell's quadratic.
 const DEVIATION_MM: f64 = 0.01;
-/// Largest distance of a cell from the surface, mm, where it is looked at: between the nine points.
+/// Largest distance of a cell's quadratic from the surface, mm, at the places where it is checked: between its nine points.
 const MODEL_MM: f64 = 2e-4;
 /// Largest distance of an edge's chords from the edge, mm.
 const EDGE_MM: f64 = 5e-4;
 /// Precision of a trimmed region's polygons, mm.
 const TRIM_MM: f64 = 1e-3;
-/// Longest side of a cell, mm: larger ones have boxes around much that they are not.
+/// Longest side of a cell, mm: the box of a larger cell would be mostly empty.
 const SIZE_MM: f64 = 10.0;
 /// Most halvings of a face; a surface that needs more is not smooth there.
 const HALVINGS: u32 = 28;
@@ -49,13 +49,13 @@ pub struct Missing {
 pub struct Part {
     /// The faces that are known.
     pub faces: Vec<PartFace>,
-    /// Those that are not.
+    /// The faces that are not known.
     pub missing: Vec<Missing>,
     cells: Vec<Cell>,
     cell_tree: Tree,
     edges: Vec<([DVec3; 2], u32)>,
     edge_tree: Tree,
-    /// Stands for the trimmed region of what is no face of a file: none of its cells is cut.
+    /// Trimmed region of a surface that is no face of a file: all of the surface.
     whole: Inside,
 }
 

@@ -50,7 +50,7 @@ pub(crate) trait Measure {
     }
 }
 
-/// The distance from a point; what is near `skip` does not count.
+/// The distance from a point. Places within the radius around `skip` do not count.
 pub(crate) struct FromPoint {
     pub(crate) point: DVec3,
     pub(crate) skip: Option<(DVec3, f64)>,

@@ -9,17 +9,17 @@ use crate::tool::{Reason, Tool};
 
 /// The share of the tool's permitted depth that a region uses; the rest is for rounding.
 const DEPTH_SHARE: f64 = 0.5;
-/// The share of it within which a place is surely clear, see [`Clearance::surely`].
+/// Share of that depth up to which a place is clear with a margin, see [`Clearance::surely`].
 const SURE_SHARE: f64 = 0.1;
 /// Places of the own face nearer to the contact than this share of the ball's radius do not count where the depth is below the error of a distance.
 const OWN_SHARE: f64 = 0.3;
-/// Ball radius times the curvature towards it, at most: towards 1 the step-over grows without bound, and the board refuses what is above.
+/// Largest product of the ball's radius and the curvature towards the ball: towards 1 the step-over grows without bound, and the board refuses larger products.
 const FIT_MAX: f64 = 0.97;
 
-/// Sine of the angle between the derivatives by u and v, at least: below it, the board's normal is off by more than 1e-6 rad.
+/// Least sine of the angle between the derivatives by u and v: below it, the board's normal is off by more than 1e-6 rad.
 const SKEW_MIN: f64 = 0.1;
-/// A derivative, at least, as a share of its change over the patch at its present rate; a normal between two rows of poles that coincide is off by 1e-6 rad
-/// where it is 0.02 to 0.04.
+/// Least derivative, as a share of its change over the patch at the rate there. Between two rows of poles that coincide the normal is off by 1e-6 rad where this share is
+/// 0.02 to 0.04.
 const STATIONARY_MIN: f64 = 1.0 / 32.0;
 
 /// A face, the tool and the part.
@@ -99,8 +99,8 @@ impl Clearance<'_> {
         self.check_to(uv, DEPTH_SHARE)
     }
 
-    /// Whether a place is clear with something to spare: what lies between four such places, the corners of a square with sides of [`Self::spacing_mm`], is
-    /// clear to the permitted depth.
+    /// Whether a place is clear with a margin: all places between four of these, the corners of a square with sides of [`Self::spacing_mm`], are clear to the permitted
+    /// depth.
     #[must_use]
     pub fn surely(&self, uv: [f64; 2]) -> bool {
         self.check_to(uv, SURE_SHARE).is_ok()

@@ -1,6 +1,5 @@
-//! The boundary of a set of places that is known by a question alone: marching squares on a grid, vertices bisected to the boundary, chords halved
-//! until they follow it, then pulled in and left with the fewest vertices that stay inside. Where a cell of the grid has places outside
-//! between corners that are inside, a grid twice as fine is taken.
+//! The boundary of a set of places that is given by a predicate: marching squares on a grid, vertices bisected to the boundary, chords halved until they follow it, then
+//! pulled in and reduced to the fewest vertices that stay inside. Where a grid cell with its corners inside has places outside, a grid twice as fine is taken.
 
 use oracle::Surface;
 use rayon::prelude::*;
@@ -12,14 +11,14 @@ const BISECTIONS: usize = 12;
 const HALVINGS: u32 = 7;
 /// Bisections of an inset: to a thousandth of it.
 const MOVE_BISECTIONS: usize = 10;
-/// How much farther in (u, v) than by the derivatives a place is moved.
+/// Largest factor by which a place is moved farther in (u, v) than its derivatives give.
 const FARTHER_MAX: f64 = 64.0;
-/// Most places of the grid.
+/// Largest number of places of the grid.
 const PLACES_MAX: usize = 4_000_000;
 
 type Place = [f64; 2];
 
-/// What is asked of the contour.
+/// Requirements on the contour.
 #[derive(Clone, Copy, Debug)]
 pub struct Precision {
     /// Spacing of the grid, mm.

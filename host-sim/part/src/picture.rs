@@ -7,7 +7,7 @@ use crate::inside::Inside;
 use crate::region::Request;
 use crate::tool::Reason;
 
-/// What becomes of a place.
+/// State of a place of a face in the picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum State {
     /// In the region.

@@ -9,13 +9,13 @@ use crate::tool::{Reason, Tool};
 use crate::tree::{Block, Tree};
 use crate::triangle::edge_nearest;
 
-/// The error of a distance, mm: depths below it are not looked for.
+/// Error of a distance, mm: smaller depths are not reported.
 pub(crate) const DISTANCE_ERROR_MM: f64 = 5e-4;
-/// Steps of a motion that are looked at between two places, mm.
+/// Distance between checked places of a motion, mm.
 const STEP_MM: f64 = 0.1;
-/// Places of the face at which the height of what is left is measured.
+/// Number of places of the face at which the height of the remaining material is measured.
 pub const LEFTOVER_SIDE: usize = 150;
-/// What is left may exceed the scallop limit by this share where passes end.
+/// Share by which the remaining material may exceed the scallop limit where passes end.
 pub const LEFTOVER_SHARE: f64 = 0.03;
 
 /// The deepest place of the tool in the part.
@@ -23,11 +23,11 @@ pub const LEFTOVER_SHARE: f64 = 0.03;
 pub struct Deepest {
     /// Depth, mm.
     pub depth_mm: f64,
-    /// Of this part of the tool: [`Reason::Ball`], [`Reason::Shank`] or [`Reason::Holder`].
+    /// The part of the tool: [`Reason::Ball`], [`Reason::Shank`] or [`Reason::Holder`].
     pub part: Reason,
     /// The ball's centre.
     pub centre_mm: DVec3,
-    /// Its index among those that were given.
+    /// Index of that centre among the given ones.
     pub index: usize,
     /// Number of the face in the file.
     pub face: usize,
@@ -64,7 +64,7 @@ pub fn deepest(part: &Part, tool: &Tool, centres: &[DVec3]) -> Option<Deepest> {
     found.max_by(|a, b| a.depth_mm.total_cmp(&b.depth_mm).then(b.index.cmp(&a.index)))
 }
 
-/// Places along a way, close enough to be looked at one by one.
+/// Places along a way, close enough that checking each one checks the way.
 #[must_use]
 pub fn along(way: &[DVec3]) -> Vec<DVec3> {
     let mut places: Vec<DVec3> = way.first().copied().into_iter().collect();
@@ -86,7 +86,7 @@ pub fn along(way: &[DVec3]) -> Vec<DVec3> {
 pub struct Leftover {
     /// The area that the tool reaches, mm2.
     pub reachable_mm2: f64,
-    /// What of it is within the scallop limit, with [`LEFTOVER_SHARE`] more, mm2.
+    /// Part of that area on which the remaining material is within the scallop limit, with [`LEFTOVER_SHARE`] more, mm2.
     pub within_mm2: f64,
     /// Highest place, mm, and where it is.
     pub highest_mm: f64,

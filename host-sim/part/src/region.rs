@@ -1,4 +1,4 @@
-//! The region of a face that a tool finishes: where the face is, and half a step-over around it, as far as nothing is in the way. It is cut at creases.
+//! The region of a face that a tool finishes: the face and half a step-over around it, without the places that break a rule. The region is cut at creases.
 
 use cad::{Face, Placement, polylines};
 use glam::DVec3;
@@ -14,11 +14,11 @@ use crate::tool::{Reason, Tool};
 use crate::tree::{Block, Tree};
 use crate::triangle::edge_nearest;
 
-/// Half a step-over, and what is left for the ends of passes.
+/// Distance by which a region is grown beyond the face, in step-overs: half of one, and a margin for the ends of passes.
 pub const GROWTH: f64 = 0.51;
 /// Greatest ratio of the step-over on a concave place to that on a plane.
 pub const STEP_MAX: f64 = 2.0;
-/// Places a side at which a face is looked at for its step-over and metric.
+/// Places along each parameter of a face at which its step-over and metric are sampled.
 const LOOKS: usize = 24;
 /// Precision of the face's own boundary, mm.
 const EDGE_MM: f64 = 0.002;
@@ -26,16 +26,16 @@ const EDGE_MM: f64 = 0.002;
 const INSET_MM: f64 = 0.01;
 /// Distance of chords from the boundary, mm.
 const CHORD_MM: f64 = 0.003;
-/// Farther in for fewer vertices, mm.
+/// Further distance by which loops may be pulled in to save vertices, mm.
 const SIMPLIFY_MM: f64 = 0.01;
 
-/// Most that the grid is made finer where the ball's centre moves farther than the contact, as around an edge.
+/// Largest factor by which the grid is refined where the ball's centre moves farther than the contact, as around an edge.
 const STRETCH_MAX: f64 = 4.0;
 /// A side shorter than this is a point, mm.
 const POLE_MM: f64 = 1e-6;
-/// Radius around such a point that no pass enters, in step-overs.
+/// Radius around a side that is a point within which no pass lies, in step-overs.
 const POLE_STEPS: f64 = 0.35;
-/// Places a side at which the reach of a face is measured.
+/// Places along each parameter at which the reach of a face is measured.
 const SIDE: usize = 64;
 /// Least ball that is tried, mm.
 const RADIUS_MIN_MM: f64 = 0.05;
@@ -46,7 +46,7 @@ const TRIALS: usize = 10;
 /// Places of a face at which a radius is tried.
 const TRIAL_PLACES: usize = 500;
 
-/// What a region is made of.
+/// Input for the region of a face.
 pub struct Request<'a> {
     /// The surface that is machined, placed.
     pub surface: &'a Surface,
@@ -73,21 +73,21 @@ pub struct Request<'a> {
 /// A region.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Made {
-    /// Its polygons.
+    /// Polygons of the region.
     pub loops: Vec<Vec<[f64; 2]>>,
     /// The area of the trimmed face, mm2.
     pub area_mm2: f64,
-    /// What of it can be reached, mm2.
+    /// Area that the tool reaches, mm2.
     pub reachable_mm2: f64,
-    /// What cannot, by the first rule that it breaks.
+    /// Area that the tool does not reach, mm2, by the first rule that it breaks.
     pub unreachable_mm2: Vec<(Reason, f64)>,
-    /// What of the reachable area lies in the polygons, mm2.
+    /// Reachable area within the polygons, mm2.
     pub inside_mm2: f64,
-    /// The largest ball that reaches 99 % of what is not too steep, mm; `None` if no ball above 0.05 mm does.
+    /// Radius of the largest ball that reaches 99 % of the area that is not too steep, mm; `None` if no ball above 0.05 mm does.
     pub radius_mm: Option<f64>,
 }
 
-/// What is seen of a face at some places.
+/// Metric and step-over of a face, from samples.
 struct Looks {
     /// Largest derivatives by u and v, mm.
     metric: [f64; 2],

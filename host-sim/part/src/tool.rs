@@ -110,7 +110,7 @@ impl Tool {
         Self { radius, columns }
     }
 
-    /// The same tool with no part thinner than the ball.
+    /// This tool with every part at least as thick as the ball.
     #[must_use]
     pub fn wide(&self) -> Self {
         let columns = self.columns.iter().map(|column| Column {
@@ -123,7 +123,7 @@ impl Tool {
         }
     }
 
-    /// The same body with another ball.
+    /// This tool with another ball; parts of the ball's diameter follow it.
     #[must_use]
     pub fn with_radius(&self, radius: f64) -> Self {
         let columns = self.columns.iter().map(|column| Column {

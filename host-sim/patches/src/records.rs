@@ -44,11 +44,11 @@ struct RecordGrid {
 
 /// The records of a surface.
 pub struct Records {
-    /// Their words, path index fastest.
+    /// Words of the records, path index fastest.
     pub words: Vec<i32>,
     /// Ends of the patches in the path parameter, ascending.
     pub path: Vec<f64>,
-    /// The same in the side parameter.
+    /// Ends of the patches in the side parameter, ascending.
     pub side: Vec<f64>,
 }
 

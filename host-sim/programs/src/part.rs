@@ -12,7 +12,7 @@ const BOARD_TARGET: &str = "thumbv7em-none-eabihf";
 pub enum Part {
     /// Reads CAD files; not optimised.
     CadReader,
-    /// The same, optimised: takes longer to build, and reads large files sooner. Only installed, never used in a checkout.
+    /// Reads CAD files; optimised: takes longer to build, and reads large files sooner. Only installed, never used in a checkout.
     FastCadReader,
     /// Talks to debug probes.
     DebugProbe,

@@ -50,7 +50,7 @@ pub fn checkout() -> Option<&'static Path> {
     }
 }
 
-/// The same, of this executable, package and working directory.
+/// The place of a process with this executable, package and working directory.
 pub(crate) fn find(executable: &Path, manifest: Option<&Path>, working: &Path) -> Place {
     let prefix = executable
         .parent()

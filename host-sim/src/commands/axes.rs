@@ -229,7 +229,7 @@ pub(super) const fn is_homed_in_part(motion: &MotionStatus) -> bool {
     !matches!(unknown(motion), 0 | 0b111)
 }
 
-/// Which axes are homed, and what is to be done for the others.
+/// Names the homed axes, and the remedy for the others.
 pub(super) fn homed_words(motion: &MotionStatus) -> String {
     match unknown(motion) {
         0 => "homed".to_owned(),

@@ -1,7 +1,7 @@
-//! Output files: written whole or not at all, over nothing without `--force`, and never over what was read.
+//! Output files: written whole or not at all, over an existing file only with `--force`, and never over a file that the command has read.
 //!
 //! A file is made without a name, or with one of its own beside its target, and takes the target's name when it is complete: a command that
-//! fails or is killed leaves what was there.
+//! fails or is killed leaves the existing file.
 
 use std::fs::{File, Metadata, Permissions};
 use std::io::{self, ErrorKind, Seek, Write};
@@ -48,7 +48,7 @@ enum Target {
 /// Whether the path may be written.
 ///
 /// # Errors
-/// It is an input, a folder, or a file and `force` is not set; its folder does not exist.
+/// The path is an input, a folder, or a file and `force` is not set; or its folder does not exist.
 pub(super) fn check(path: &Path, force: bool) -> Result<()> {
     target(path, force).map(|_| ())
 }

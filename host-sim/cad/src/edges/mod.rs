@@ -21,9 +21,9 @@ use super::{Boundary, Face, Outline};
 const FOLLOWS_MM: f64 = 4e-4;
 /// Least sine of the angle between the derivatives: closer together, the normal loses digits and steps of passes shrink.
 const SINE_MIN: f64 = 0.25;
-/// Least derivative, as a share of the longest one: what is less is nearly a point.
+/// Least derivative, as a share of the longest one: a side with a smaller derivative is nearly a point.
 const SLOWEST: f64 = 0.02;
-/// Places a side of each patch at which the derivatives are looked at.
+/// Places along each parameter of a patch at which the derivatives are checked.
 const LOOKS: u32 = 6;
 
 /// The face with parameters between its four edges, and its outline with those, which is the whole rectangle; `None` where it has none.

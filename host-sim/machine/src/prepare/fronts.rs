@@ -16,10 +16,10 @@ const CREASE_MAX: f64 = 1e-3;
 /// Radius of a circle that is a point, mm.
 const POINT_MM: f64 = 1e-5;
 
-/// Refuses a region that ends on a point, too many path spans, and a job for whose stations the store has no room.
+/// Checks a job with passes of constant scallop height.
 ///
 /// # Errors
-/// As above.
+/// The region ends on a point, there are too many path spans, or the store has no room for the stations.
 pub(super) fn check(job: &Job, prepared: &Prepared) -> Result<(), JobError> {
     if !job.spacing.is_constant() {
         return Ok(());

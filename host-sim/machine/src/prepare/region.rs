@@ -101,7 +101,7 @@ pub(super) fn add(job: &Job, region: &Region, prepared: &mut Prepared) -> Result
     })
 }
 
-/// What is machined from a first line to a last one.
+/// A part of the region that is machined from a first line to a last one.
 struct Cell {
     edges: Vec<Edge>,
     lines: [i32; 2],

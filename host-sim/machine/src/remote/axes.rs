@@ -60,7 +60,7 @@ fn names(lines: InputLines) -> String {
     }
 }
 
-/// What ended a motion that should have gone on, and the remedy; `None` where it did what was asked.
+/// Why a motion ended early, and the remedy; `None` for one that was carried out.
 #[must_use]
 pub fn failure(motion: &MotionStatus) -> Option<(String, &'static str)> {
     let lines = names(motion.lines);

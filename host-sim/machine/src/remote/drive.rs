@@ -31,7 +31,7 @@ pub struct Compared {
     pub first_bad_index: Option<u32>,
     /// An operator changed the run, so that nothing was compared.
     pub commanded: bool,
-    /// What the line lost.
+    /// Events that the line lost.
     pub losses: LineLosses,
 }
 

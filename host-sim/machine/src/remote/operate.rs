@@ -62,7 +62,7 @@ pub fn make_ready(session: &mut Session, setup: &Setup) -> Result<(), RemoteErro
 
 /// Source of commands during a run on the board's own clock.
 pub trait Operator {
-    /// What is wanted next, if anything is.
+    /// The operator's next command, if there is one.
     fn wish(&mut self) -> Option<Request>;
 
     /// Whether an operator who could resume a held run is still present.
@@ -73,7 +73,7 @@ pub trait Operator {
         true
     }
 
-    /// How the board is when the run begins to be followed.
+    /// The run begins to be followed; `status`: the board's state then.
     fn begins(&mut self, status: &Status) {
         let _ = status;
     }
@@ -83,7 +83,7 @@ pub trait Operator {
         let _ = cause;
     }
 
-    /// What came of it: how the board was then, or that it refused.
+    /// The outcome of a command: the board's state after it, or the refusal.
     fn told(&mut self, request: &Request, came: Result<Status, RemoteError>);
 }
 
@@ -94,7 +94,7 @@ pub(super) struct Following<'a> {
     pub(super) commanded: bool,
     /// The feed override is 0.
     no_feed: bool,
-    /// Why the board has paused by itself, as the operator was told.
+    /// Cause of the board's own pause that the operator was last informed of.
     paused: PauseCause,
 }
 

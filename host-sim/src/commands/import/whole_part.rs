@@ -122,7 +122,7 @@ impl<'a> Output<'a> {
     }
 }
 
-/// A planned part, and the paths of what is written of it.
+/// A planned part, and the paths of its output files.
 struct Planned<'a> {
     file: &'a str,
     model: &'a Model,
@@ -211,7 +211,7 @@ pub(super) fn command(arguments: &Arguments, file: &str, model: &Arc<Model>, out
     conclude(arguments, &planned, &output)
 }
 
-/// Writes and prints what is told of the part.
+/// Writes page and summary of the part, and prints the summary.
 fn conclude(arguments: &Arguments, planned: &Planned<'_>, output: &Output<'_>) -> Result<()> {
     output_file::write(&planned.page, page(planned).as_bytes(), arguments.force)?;
     let summary = summary(planned);

@@ -1,11 +1,12 @@
-//! The cells of curved passes: each cut off at its last line, so that no front goes on beyond it; from the middle parted there, and the lower part goes backwards.
+//! The cells of curved passes. Each is cut off at its last line, so that no front continues beyond that line. With a start in the middle a cell is divided there, and its
+//! lower part is machined backwards.
 
 use interp_core::job::region::{Edge, FRONT_SIDE_BITS};
 use job::Start;
 
 use super::{Cell, first_line, intervals, sides};
 
-/// Distance of the last line from the end of the side parameter, at least: 6 nm in 100 mm, so that no rounding takes a pass beyond it.
+/// Least distance of the last line from the end of the side parameter, units of the fronts: 6 nm in 100 mm, so that rounding takes no pass beyond the end.
 const BEFORE_END: i32 = 16;
 
 /// The cells of a part of a region with these lines, in order.
@@ -67,7 +68,7 @@ fn cut_off(
     }
 }
 
-/// The edges of what is below a line and on it.
+/// The edges of the part on a line and below it.
 fn cut_above(edges: &[Edge], line: i32) -> Vec<Edge> {
     // The line crosses edges that end above it.
     let end = line + 1;
@@ -79,7 +80,7 @@ fn cut_above(edges: &[Edge], line: i32) -> Vec<Edge> {
     )
 }
 
-/// The edges of what is above a line and on it.
+/// The edges of the part on a line and above it.
 fn cut_below(edges: &[Edge], line: i32) -> Vec<Edge> {
     cut(
         edges,
@@ -89,7 +90,7 @@ fn cut_below(edges: &[Edge], line: i32) -> Vec<Edge> {
     )
 }
 
-/// The edges that are kept, and of those that a line meets what is between it and the end that is kept; along the line from each crossing to the next.
+/// The edges on one side of a line: whole ones, those that meet the line from there to the kept end, and along the line from each crossing to the next.
 fn cut(
     edges: &[Edge],
     line: i32,

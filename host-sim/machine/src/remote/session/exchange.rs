@@ -12,19 +12,19 @@ use super::{Event, RemoteError, Session};
 /// checks a job, or a QEMU that shares its processor, may take longer.
 const ANSWER_TIMEOUT: Duration = Duration::from_millis(1500);
 
-/// The same while a board's patience runs: a share of the time between two frames that it wants to hear, so that one lost frame leaves it well
-/// within its patience. Not below what a USB-serial adapter may keep a frame back.
+/// During a run the time-out of a reply is the board's heartbeat timeout divided by this, so that a lost frame is repeated well before the heartbeat timeout.
 const KEEP_ALIVE_SHARE: u32 = 4;
+/// Least time-out of a reply: a USB-serial adapter may delay a frame by almost as long.
 const ANSWER_TIMEOUT_MIN: Duration = Duration::from_millis(40);
 
-/// The same of a part of a job, whose frame is the longest and so the first to suffer on a bad line: it takes 3 ms on a serial line, and the board a few more for a row
-/// of a streamed job.
+/// Time-out of the reply to a part of a job. Its frame is the longest, so it is the first to suffer on a bad line; it takes 3 ms on a serial line, and the board a few more
+/// for a row of a streamed job.
 const CHUNK_TIMEOUT: Duration = Duration::from_millis(200);
 
-/// Time after which a request is given up.
+/// Time after which a request to a board is given up.
 const GIVE_UP: Duration = Duration::from_secs(6);
 
-/// The same of a process, and the time-out of the events of its run.
+/// Time after which a request to a process is given up, and time-out of the events of its run.
 pub(super) const PROCESS_SILENCE_TIMEOUT: Duration = Duration::from_secs(780);
 
 impl Session {

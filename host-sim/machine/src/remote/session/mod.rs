@@ -1,12 +1,12 @@
 //! One session with a board: numbered requests with their replies, and events in between.
 //!
 //! ```text
-//! mod.rs        opens a session, and what its owner sets
-//! requests.rs   what is requested of the board, each with its reply
+//! mod.rs        opens a session; settings of its owner
+//! requests.rs   the requests, each with its reply
 //! waiting.rs    waits for the events of a run: silence, missing events, an end whose event was lost
 //! streaming.rs  the words of a streamed job, sent while it runs
 //! exchange.rs   a request and its reply as frames: numbers, time-outs, retransmission
-//! error.rs      what can go wrong between the host and the board
+//! error.rs      failures between the host and the board
 //! ```
 
 mod error;
@@ -33,7 +33,7 @@ use super::feed::Feed;
 /// A line to a board. Reading returns [`std::io::ErrorKind::TimedOut`] or [`std::io::ErrorKind::WouldBlock`] after some
 /// milliseconds without a byte.
 pub trait Stream: Read + Write + Send {
-    /// Whether the other end is a process of this machine: its end ends the line, so that it is waited for as long as it lives.
+    /// Whether the other end is a process on this computer. Its end closes the line, so a session waits for it as long as it lives.
     fn is_process(&self) -> bool {
         false
     }

@@ -1,4 +1,4 @@
-//! The picture of a part: what is finished, what is not.
+//! The picture of a part: which places are finished, and which are not, and why.
 
 use cad::Face;
 use job::FaceReach;
