@@ -123,8 +123,8 @@ fn check_sample_job(name: &str, times: f32, pattern: Pattern, machine_of: fn(i32
     assert_eq!(sample.cl_nm, axes.home_nm, "{what}: back where it began");
 }
 
-/// A run that begins straight above its first pass goes down at once, and one that ends elsewhere goes there at the height that it is given: neither comes near the safe height. From any
-/// other place the run begins at the safe height.
+/// A run that begins straight above its first pass goes down at once, and a run with an end of its own goes there at the given height: neither reaches the safe height. From any other
+/// place a run begins at the safe height.
 #[test]
 fn a_run_between_others_stays_low() {
     let (mut header, words) = dome();

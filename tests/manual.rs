@@ -91,7 +91,7 @@ fn every_axis_finds_its_switch_wherever_it_stands() {
     }
 }
 
-/// A machine without a switch of z: x and y are homed, their travel is a soft limit, that of z is none; a run is refused until z is declared.
+/// A machine without a switch of z: x and y are homed, the travel of x and y is a soft limit, the travel of z is not; a run is refused until z is declared.
 #[test]
 fn an_axis_without_a_switch_is_declared() {
     let mut rig = Rig::new([120 * MM, 30 * MM, -40 * MM]);

@@ -364,7 +364,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         }
     }
 
-    /// A period in which the run waited for words: it is none of its ticks, and costs no credit.
+    /// A period in which the run waited for words: it does not count as a tick of the run, and takes no credit.
     #[cold]
     #[inline(never)]
     fn starve(&mut self) {

@@ -125,8 +125,8 @@ impl Session {
         self.event(|events| Reply::Halted(Status { events, ..status }), out);
     }
 
-    /// Answers a frame. Whether it is a sign of life: a request that was carried out or refused on its merits, now or when it was first sent. Noise, frames of
-    /// another session and requests out of order are none.
+    /// Answers a frame. Returns whether the frame is a sign of life: a request that was carried out or refused on its merits, now or when it was first sent. Noise, frames of
+    /// another session and requests out of order are no signs of life.
     #[inline(never)]
     pub(crate) fn frame(
         &mut self,

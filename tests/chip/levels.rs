@@ -17,8 +17,8 @@ const STEP_INVERTED: [bool; 3] = [true, false, true];
 const ENABLE_INVERTED: [bool; 3] = [false, true, false];
 const PULSE_US: u64 = 2;
 
-/// Cycles from a reset until the pins have the profile's levels, two seconds and a half: the erases of two sectors of a second come first, the settings' and the journal's, once after
-/// the first record in each. Until then they have those of the board's table.
+/// Longest time from a reset until the pins have the profile's levels, cycles: two seconds and a half, because two sectors are erased first, a second each, once after the first
+/// record. Until then the pins have the levels of the board's table.
 const LEVELS_CYCLES: u64 = 2_500_000 * CYCLES_US;
 
 /// The active level of a line.

@@ -28,10 +28,10 @@ pattern = \"zigzag\"
 const FEED_MM_S: f64 = 15.0;
 const STEPS_PER_MM: f64 = 400.0;
 
-/// Time from the moment at which the drives let go to that at which the voltage is low, ms.
+/// Time from the drives' loss of power to the voltage detector's level, ms.
 const LAG_MS: u32 = 60;
-/// What is machined again after a cut with time for a record, mm: the way of 150 periods, of those until the board is at it, and the last half millimetre of a pass, whose places
-/// are not noted.
+/// Longest way machined again after a cut with time for a record, mm: 150 periods at the feed, a few periods until the record is written, and the last half millimetre of a
+/// pass, whose places are not recorded.
 const AGAIN_MAX_MM: f64 = FEED_MM_S * 0.155 + 0.55;
 
 struct Bench {

@@ -67,7 +67,8 @@ fn no_sequence_breaks_a_limit_on_straight_passes() {
     run_sequences(false);
 }
 
-/// Changes of the pace where the plan's own jerk changes by its whole limit within an interval of the plan: what held in the middle of a slot used up to 1.064 of the limit at its start.
+/// Changes of the pace where the plan's own jerk changes by its whole limit within an interval of the plan. A change that kept the limit in the middle of a slot once used up to
+/// 1.064 of it at the slot's start.
 #[test]
 fn a_pace_that_changes_where_the_jerk_does() {
     for (region, sequence) in [(239, 7185), (418, 12546), (502, 15076), (518, 15567)] {

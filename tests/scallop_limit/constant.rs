@@ -121,8 +121,8 @@ fn number(name: &str, usual: u64) -> u64 {
     std::env::var(name).map_or(usual, |cases| cases.parse().unwrap())
 }
 
-/// Side lines at 60 degrees, and a front along a knot at which the curvature jumps: the crests were found too high, but the front was lowered beside its balls, up to three intervals
-/// away from them, and they stayed 0.6 and 0.8 % above the limit. At a fifth of the feed, so that the sharp bends are measured.
+/// Side lines at 60 degrees, and a front along a knot at which the curvature jumps. A front once was lowered up to three intervals away from the balls of its crests, which
+/// stayed 0.6 and 0.8 % above the limit. The feed is a fifth of the usual one, so that the sharp bends are measured.
 #[test]
 fn skew_side_lines_at_a_knot() {
     for start in [Start::Edge, Start::Middle] {
@@ -269,8 +269,8 @@ fn triangles() {
     assert!(found.faults + found.above == 0 && found.held >= 8, "{found:?}");
 }
 
-/// Flat triangles, whose sides leave the passes' ends at 60 degrees and more from the right angle: fronts bend there by tens of degrees within one period at the feed. Contacts,
-/// normals and centres are checked, not the steps: three samples do not tell the way between them where it bends so much (`contact::tests` do).
+/// Flat triangles, whose sides meet the passes' ends at 60 degrees and more from the right angle: fronts bend there by tens of degrees within one period at the feed. Contacts,
+/// normals and centres are checked; steps are checked by `contact::tests`, because three samples do not determine the way between them in a sharp bend.
 #[test]
 fn sharp_corners_of_triangles() {
     for (seed, start) in [
@@ -297,8 +297,8 @@ fn sharp_corners_of_triangles() {
     }
 }
 
-/// Within axis limits a step before the point of a triangle: the crest between the last line and the point is too high, so a line between is made, which once was lowered from beyond the point, and then
-/// from a hair before it to behind the line it came from.
+/// The last step before the point of a triangle, within axis limits. The crest between the last line and the point is too high, so a line between them is made. That line once was
+/// lowered from beyond the point, and in another case to behind the line before it.
 #[test]
 fn a_line_before_the_point_of_a_triangle() {
     for seed in [17, 234] {

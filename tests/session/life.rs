@@ -43,7 +43,7 @@ fn only_a_request_is_a_sign_of_life() {
     line.give(&frame(3, &Request::Start));
     assert_eq!(line.mock.heard, 4);
 
-    // A host of another version, and one without a session, are none either.
+    // Requests of a host of another version, or without a session, are no signs of life either.
     let mut line = Line::default();
     line.give(&frame(1, &Request::Status));
     let other = Request::Hello {

@@ -471,11 +471,11 @@ impl Course {
         self.run(start.ok_or("no such place")?, steps)
     }
 
-    /// What comes of a stop at an override of 0 in the approach to the first pass, which ends there where the way is too short to stop on, of an abort in the retract
-    /// from there, and of a new start.
+    /// Outcome of three commands: a stop at an override of 0 in the approach to the first pass, at whose start the tool rests where the way is too short to stop on; an abort in
+    /// the retract from there; a new start.
     ///
     /// # Errors
-    /// What the first that breaks something breaks.
+    /// The first broken rule.
     pub fn start_again_from_the_first_pass(&self) -> Result<Outcome, String> {
         let mut all = Outcome::default();
         let places = self.starts.iter();

@@ -78,7 +78,8 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         self.control.spindle.is_awaited() && !self.interpolator.state().is_under_way()
     }
 
-    /// The run came to rest, because the host is gone or for a pause: the spindle too; with a pause if the profile says so, above the surface or with the door open.
+    /// The run has come to rest. In a hold the spindle stops after a heartbeat timeout, and if it was below its speed; else if the profile says so and the tool is above the surface or
+    /// the door is open.
     #[cold]
     #[inline(never)]
     pub(super) fn came_to_rest(&mut self, state: State) {

@@ -1,9 +1,9 @@
 //! Sectors of the chip's flash that are not the program's (RM0090, 3.6): the last two for settings and the journal, the two before them for jobs.
 //!
 //! The chip has one bank: while a word is written (16 us, 100 at most) or a sector erased (1 s, 2 s at most) the processor waits at its next fetch from flash. So
-//! records are written word by word, a stall each, and sectors are erased before the first tick. A word is written with interrupts off, from the unlocking of the registers to
-//! their locking: the supply's interrupt may write another at any time, and nothing is lost, because no interrupt could be fetched meanwhile. All but that interrupt begin a word
-//! only where the slowest is written before the next tick is due: a tick that came late would set the pins of its directions too late. Words need 2.7 V.
+//! records are written word by word, with one stall per word, and sectors are erased before the first tick. Interrupts are off while a word is written, from the unlocking of the
+//! registers to their locking, because the supply's interrupt may write another word at any time. That delays no interrupt: none could be fetched meanwhile. Except in that
+//! interrupt, a word is begun only if the longest write ends before the next tick is due: a late tick would set its direction pins too late. Writing needs 2.7 V.
 //! `memory.x` leaves these sectors out of the image's region.
 
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};

@@ -48,7 +48,7 @@ pub(crate) struct StepDriver {
     settles: u8,
 }
 
-/// Ticks after a change of the idle word until a buffer holds nothing else: the one that is output at the change is cleared whole only when it is output again.
+/// Ticks after a change of the idle word until both buffers hold the new word: the buffer that is output at the change is cleared completely only when it is output again.
 const SETTLE_TICKS: u8 = 2;
 
 /// The pins of a board and the clock of its slots.

@@ -243,8 +243,8 @@ fn direction(
     }
 }
 
-/// Knots of one direction with which the lines in that direction are within the tolerance, apart from those of the surface: only where its tangent plane jumps they are kept. A span is halved while it
-/// is beyond the tolerance. Surfaces of many short pieces, which are smooth but for the file's knots, take fewer spans so.
+/// Knots of one direction with which the lines in that direction are within the tolerance. Of the surface's own knots only those at which the tangent plane jumps are kept. A span
+/// is halved while it is beyond the tolerance. Surfaces of many short pieces that join smoothly need fewer spans than with their own knots.
 fn fewest(surface: &Surface, k: usize, ranges: [[f64; 2]; 2], tolerance_mm: f64) -> Result<Axis, FitError> {
     let range = ranges[k];
     let mut breaks = vec![(range[0], 0)];

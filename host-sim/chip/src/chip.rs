@@ -282,7 +282,7 @@ impl Chip {
         }
     }
 
-    /// The first pulse: a step pin that goes back to its level within [`PULSE_MAX_S`]. A change of the idle level is none.
+    /// Finds the first pulse: a step pin that returns to its level within [`PULSE_MAX_S`]. A change of the idle level is no pulse.
     fn look_for_pulse(&mut self, at: u64, pins: u32) {
         if pins == 0 {
             return;

@@ -13,9 +13,9 @@ use machine::prepare::prepare;
 /// Relative growth of cycles that is accepted.
 pub const GROWTH_MAX: f64 = 0.02;
 
-/// Stages whose longest tick comes and goes from run to run by as many cycles as were seen, on a busy machine most: the code of the report at a change of pass. What takes
-/// them is not known. Their means have no such allowance.
+/// Stages whose longest tick varies from run to run, most on a busy computer: the code that reports a change of pass. The cause is not known. Their means have no allowance.
 const REPORTS: [&str; 3] = ["everything else", TICK, TICK_AND_PULSES];
+/// Allowance for the longest tick of these stages, cycles: the largest variation seen.
 const REPORT_CYCLES: f64 = 180.0;
 
 /// Relative difference of a number of operations that is accepted in either direction: a compiler may choose other instructions.

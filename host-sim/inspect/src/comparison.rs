@@ -156,7 +156,7 @@ pub fn by_sample(
     let mut digest = Digest::new();
     rows.iter().for_each(|sample| digest.sample(sample));
     let is_proven = status.digest == digest.value();
-    // What did not come of a commanded run has nothing to be compared with.
+    // Missing samples of a commanded run cannot be taken from the simulation.
     let unproven = (!is_proven && (!commanded || missing == 0)).then_some(first_missing);
     let run = BoardRun {
         status,

@@ -30,7 +30,7 @@ fn split(path: &Path) -> (PathBuf, Option<usize>) {
 /// The jobs of a file: `FILE#FACE` for each face of a job of many, else the file itself.
 ///
 /// # Errors
-/// A `[[face]]` that is none.
+/// A `[[face]]` is not valid.
 pub fn jobs_of(path: &Path) -> Result<Vec<PathBuf>, JobError> {
     let (file, None) = split(path) else {
         return Ok(vec![path.to_owned()]);

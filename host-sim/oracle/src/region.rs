@@ -323,7 +323,8 @@ impl Oracle {
         }
     }
 
-    /// Whether two passes, each by its side parameter and its range of the path parameter, are in one cell of the region, which is between them somewhere in a range, too.
+    /// Whether two passes, each given by its side parameter and its range of the path parameter, lie in one cell of the region that also covers a place between them within the
+    /// range `from` to `to`.
     #[must_use]
     pub fn are_in_one_cell(&self, passes: [(f64, [f64; 2]); 2], [from, to]: [f64; 2]) -> bool {
         let [(near, _), (far, _)] = passes;

@@ -47,7 +47,7 @@ pub struct PassEstimate {
 }
 
 impl PassEstimate {
-    /// Whether these passes are better than others: by their time if both leave at most [`LEFT_SHARE_MAX`], else by the share that they leave.
+    /// Whether these passes are better than others: by their time if both leave at most 0.5 % (`LEFT_SHARE_MAX`), else by the share that they leave.
     #[must_use]
     pub fn is_better_than(&self, other: &Self) -> bool {
         match [self, other].map(|estimate| estimate.left_share <= LEFT_SHARE_MAX) {

@@ -324,8 +324,8 @@ impl Set<'_> {
         self.chord(found, b, step, chord_mm, left - 1, out);
     }
 
-    /// A place moved by so much of (u, v), as far as that is in space by the derivatives at it, mm: farther where it is less, because they vanish there, nearer
-    /// where it is more. Not beyond the rectangle.
+    /// `from` moved by `by` in (u, v), scaled so that it moves by `length_mm` in space: by more where the derivatives nearly vanish, by less where they grow. Not beyond the
+    /// rectangle.
     fn moved(&self, from: Place, by: Place, length_mm: f64) -> Place {
         let to = |share: f64| -> Place {
             std::array::from_fn(|k| {
@@ -428,7 +428,7 @@ impl Set<'_> {
     }
 }
 
-/// A polygon without vertices at which it goes back along the way that it came: on a side of the rectangle nothing lies between the two ways, but the polygon reaches there.
+/// Removes spikes: vertices at which the polygon turns back along its own edge, as on a side of the rectangle. A spike has no area.
 fn without_spikes(mut polygon: Vec<Place>) -> Vec<Place> {
     let is_spike = |[a, b, c]: [Place; 3]| {
         let [to, on] = [[b[0] - a[0], b[1] - a[1]], [c[0] - b[0], c[1] - b[1]]];

@@ -235,7 +235,7 @@ fn report_is_well_formed_small_and_says_what_was_found() {
     }
 }
 
-/// The picture has what is wrong, too: marks with numbers and words, and the ridges above the limit, as long as they are.
+/// The picture also shows the failures: marks with numbers and words, and the ridges above the limit in their length.
 #[test]
 fn marks_and_high_ridges_are_in_the_picture() {
     let (_, sketch, findings) = run(BELL);

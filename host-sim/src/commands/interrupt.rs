@@ -19,7 +19,7 @@ pub(super) fn watch(what: &str) {
                 std::process::exit(INTERRUPTED);
             }
         });
-        // Where it cannot be caught it ends the program as ever, and the board stops what it does not hear.
+        // An interrupt that cannot be caught ends the program, and the board stops the motion at its heartbeat timeout.
         if caught.is_ok() && console::user_attended_stderr() {
             to_stderr(format_args!("{what}"));
         }

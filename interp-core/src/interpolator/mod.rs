@@ -147,7 +147,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
         self.motion.program.reject(fault);
     }
 
-    /// Whether the last tick was none of the run: the next rows of a streamed job are not there. The tool stands, the sample is as it was, and nothing is planned.
+    /// Whether the last tick did not count for the run, because the next rows of a streamed job are not loaded. The tool stands, the sample stays, and nothing is planned.
     #[must_use]
     #[inline]
     pub const fn is_starved(&self) -> bool {
@@ -309,8 +309,8 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> Interpolator<S> {
         &self.motion.last
     }
 
-    /// Whether [`Self::plan`] has anything to do in this period: a job with axis limits is under way, and a pass ahead of the tool is not planned, or the next tick not
-    /// prepared; or one without them, and the current pass is not scanned for the step to the next one; or no run is under way, and the next one is not prepared.
+    /// Whether [`Self::plan`] has work in this period. With axis limits: a pass ahead of the tool is not planned, or the next tick is not prepared. Without: the current pass is
+    /// not scanned for the step to the next one. At rest: the next run is not prepared.
     #[must_use]
     #[inline]
     pub fn has_to_plan(&self) -> bool {

@@ -123,8 +123,8 @@ pub enum Spacing {
     ConstantFromMiddle = 3,
     /// As [`Self::Constant`], from the last side boundary to the first.
     ConstantFromEnd = 4,
-    /// As [`Self::Exact`], where the last side boundary is a single point: within axis limits it is one sample with one normal, and the step to it is half as long. With [`Self::Exact`] there the crest beside the point may be
-    /// four times the limit.
+    /// As [`Self::Exact`], where the last side boundary is a single point: within axis limits that point is one sample with one normal, so the step to it is half as long. With
+    /// [`Self::Exact`] the crest beside the point may be four times the limit.
     ExactToPoint = 5,
 }
 

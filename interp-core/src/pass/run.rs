@@ -62,13 +62,15 @@ pub(crate) struct Run {
     step_over: Option<f32>,
     /// That pass, once its first patch is collapsed.
     next_route: Option<Route>,
-    /// What is prepared of the next sample.
+    /// The prepared part of the next sample.
     prepared: Prepared,
     /// Feed factor of the last step along the pass.
     last_feed_factor: f32,
-    /// The passes of a region, and the next of them without axis limits; a fault of theirs is reported when the tool is there.
+    /// The passes of a region.
     pub(crate) lines: RegionLines,
+    /// The next pass of the region, without axis limits.
     next_pass: NextPass,
+    /// A fault of that pass, reported when the tool comes to it.
     pending: Option<Fault>,
 }
 

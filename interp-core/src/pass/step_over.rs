@@ -68,14 +68,17 @@ pub(crate) struct StepOverEstimator {
     before: Option<f32>,
     /// The step that is expected of this pass, by what the lines of the previous one showed.
     expected: f32,
-    /// The first pass is looked at for the second time.
+    /// The first pass is being evaluated for the second time.
     looked_again: bool,
-    /// Side span of the pass, and patches of it so far.
+    /// Side span of the pass.
     side_span: u16,
+    /// Number of patches of the pass so far.
     patches: u16,
-    /// The last path span of the pass, the fractions at which it starts on its first patch and ends on its last, and whether these are the surface's boundaries.
+    /// The last path span of the pass.
     last_span: u16,
+    /// Fractions at which the pass starts on its first patch and ends on its last one, 2^-64.
     range: [u64; 2],
+    /// Whether the pass starts, and ends, on the surface's boundary.
     is_whole: [bool; 2],
     /// The line to evaluate next.
     second: bool,

@@ -38,9 +38,11 @@ pub(crate) struct Usart {
     arrived: u64,
     pub(crate) sent: u64,
     pub(crate) received: u64,
-    /// Lost bytes, lost frame delimiters among them: because the program did not read them, and because the flash worked; and bytes received while the port was off.
+    /// Bytes lost because the program did not read them in time.
     pub(crate) overruns: u64,
+    /// Bytes lost while the flash was busy.
     pub(crate) lost_to_flash: u64,
+    /// Bytes received while the port was off.
     pub(crate) unheard: u64,
     /// Maximum time from a byte's arrival to its read, apart from operations of the flash, cycles.
     pub(crate) longest_wait: u64,
@@ -81,7 +83,7 @@ impl Usart {
     /// Bytes from the host are on their way, from this time on.
     pub(crate) fn begin(&mut self, at: u64, apb2: u64) {
         if self.received_at == NEVER && !self.from_host.is_empty() {
-            // A line without a rate takes bytes away all the same.
+            // Bytes pass on a line without a rate, too.
             self.received_at = at + self.byte_cycles(apb2).max(1_000);
         }
     }

@@ -8,10 +8,11 @@ use super::Prepared;
 use super::geometry::SurfaceEvaluator;
 
 const REMEDY: &str = "write spacing = \"exact\"";
-/// Points of each knot line at which the derivatives on both sides are compared, their distance from it as a share of the range, and their greatest relative
-/// difference: a pass bends by as much there.
+/// Number of points of each knot line at which the derivatives on both sides are compared.
 const CREASE_POINTS: u32 = 9;
+/// Distance from the knot line at which the derivatives are taken, as a share of the range.
 const CREASE_STEP: f64 = 1e-9;
+/// Greatest relative difference of these derivatives: a pass bends by as much there.
 const CREASE_MAX: f64 = 1e-3;
 /// Radius of a circle that is a point, mm.
 const POINT_MM: f64 = 1e-5;

@@ -35,7 +35,8 @@ pub struct Compared {
     pub losses: LineLosses,
 }
 
-/// Uploads a job, or what the store has room for of a streamed one, whose rest is sent while the session waits for events of its run; then the settings of its drives if it gives any; the board has its own for a job without. `progress` is called with the number of words transferred.
+/// Uploads a job, then the settings of its drives if it gives any; else the board keeps its own. Of a streamed job it uploads as much as the store holds; the rest is sent while
+/// the session waits for events of the run. `progress` is called with the number of words transferred.
 ///
 /// # Errors
 /// The line breaks, the board refuses the job, or it reports other settings of the drives than the job's.

@@ -463,7 +463,7 @@ mod tests {
         assert!(uncut > 0.3 && uncut < 0.5, "{uncut}");
     }
 
-    /// Sentence and place of a failure are of one decision; of a surface that no ball reaches in part, the height there is none of its own.
+    /// Sentence and place of a failure come from one decision. The height of places that no ball reaches is no failure besides that of the uncut surface.
     #[test]
     fn failures_are_decided_once() {
         let (job, oracle) = torus(0.05);

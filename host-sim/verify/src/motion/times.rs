@@ -434,7 +434,7 @@ mod tests {
         }
     }
 
-    /// A wait straight above the end of a pass is none in contact; one on the boundary is.
+    /// A wait straight above the end of a pass is no stand in contact; a wait on the boundary is one.
     #[test]
     fn a_wait_above_a_pass_is_not_in_contact() {
         for (up_nm, stands) in [(300_000, 0), (0, 1)] {

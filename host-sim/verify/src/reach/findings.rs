@@ -113,7 +113,7 @@ impl ReachFinding {
 pub struct ReachResult {
     /// Which half of the ball touches.
     pub contact: ContactSide,
-    /// What of the surface looks down; its turn is that of the surface as it is placed.
+    /// The part of the surface that looks down; the turn in it applies to the placed surface.
     pub facing: Facing,
     /// The job's `rotate_deg` with which nothing would look down; `None` where there is none, or none is needed.
     pub rotate_deg: Option<[f64; 3]>,

@@ -354,7 +354,7 @@ mod tests {
         assert_eq!(motion.turns, [5, 12, 15, 23, 27, 33]);
         motion.join([false, true, false, false].into_iter());
         assert_eq!(motion.turns, [5, 23, 27, 33]);
-        // What is joined is between passes all the same.
+        // Joined stretches still count as between passes.
         let between = links(&motion, f64::INFINITY);
         for (sample, is_link) in [
             (2, true),

@@ -436,7 +436,7 @@ fn the_ball_between_passes() {
                 let lowest = at(35.0, 6.3, -dip);
                 assert!(dip > 4.0 || found.centre_mm.distance(lowest) < 0.1, "{found:?}");
             }
-            // A turn that counts as in contact is between passes all the same.
+            // A turn that counts as in contact still counts as between passes.
             if !joined {
                 motion.join([true].into_iter());
             }

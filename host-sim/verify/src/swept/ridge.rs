@@ -536,8 +536,8 @@ impl<'a> Gap<'a> {
     }
 }
 
-/// Range of the path parameter where two passes of a region are beside each other, without the ends that are no boundary of the surface: at the same parameter one
-/// pass may be ahead of the other.
+/// Range of the path parameter in which two passes of a region lie beside each other. Ends that are not on the surface's boundary are left out, because there one pass may be
+/// ahead of the other at the same parameter.
 fn beside(oracle: &Oracle, passes: [&PassHeight<'_>; 2]) -> Option<[f64; 2]> {
     let ends = [passes[0].pass().path_range()?, passes[1].pass().path_range()?];
     let sides = passes.map(|pass| pass.pass().side);

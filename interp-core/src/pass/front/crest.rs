@@ -20,11 +20,13 @@ const FOOT_STEPS: u8 = 3;
 const INTERVALS_MAX: u8 = 16;
 /// Greatest correction of the foot that is taken from one ball, as a share of the distance in the metric.
 const CORRECTION_MAX: f32 = 0.3;
-/// A crest that is farther than this from where it was expected, as a share of the gap, is measured again, unless the gap could be wider by this factor, and more where it
-/// is far.
+/// A crest farther than this from its expected place, as a share of the gap, is measured again, unless it is clearly below the limit ([`CLEAR`]).
 const REPEAT_MIN: f32 = 0.03;
+/// Largest number of repeated measurements of a crest.
 const REPEATS_MAX: u8 = 2;
+/// Factor by which the gap could be wider at a crest that need not be measured again.
 const CLEAR: f32 = 1.05;
+/// Growth of that factor with the distance of the crest from its expected place.
 const CLEAR_OFF: f32 = 2.0;
 /// Least share of the gap between the crest and a pass.
 const SHARE_MIN: f32 = 0.1;

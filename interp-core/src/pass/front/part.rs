@@ -113,7 +113,7 @@ impl PartSearch {
         matches!(self.stage, Stage::Found)
     }
 
-    /// The part that was found, none where there is none, and whether it is the last one; the search for the next one begins if it is not.
+    /// Takes the found part, `None` if the front has no further part, and whether it is the last one. If it is not, the search for the next one begins.
     pub(crate) fn take(&mut self, stations: Stations, cursor: SideCursor) -> (Option<Route>, bool) {
         let front = FrontLine {
             direction: self.direction,

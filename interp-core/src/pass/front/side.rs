@@ -189,7 +189,7 @@ impl SideCursor {
         }
     }
 
-    /// Whether a distance from the first front, fine units, is behind the span (true) or before it (false), and there is another span there; none where it is on it.
+    /// Whether a distance from the first front, fine units, is on a span behind this one (true) or before it (false); `None` on this span, and where there is no further span.
     pub(crate) fn side_of(&self, job: &Job<'_>, direction: &Direction, distance: i64) -> Option<bool> {
         let from_start = direction.whole(distance).wrapping_sub(fine(self.start));
         if from_start < 0 && self.span > 0 {

@@ -34,7 +34,7 @@ impl PassPlanning {
 }
 
 impl Run {
-    /// Begins the first pass, or the next one. False where that is not made yet; none where there is none.
+    /// Begins the first pass, or the next one. `Some(false)`: that pass is not made yet; `None`: there is no further pass.
     #[inline(never)]
     pub(super) fn change_pass(&mut self, job: &Job<'_>) -> Result<Option<bool>> {
         let next = if self.travel.next == Next::Pass {

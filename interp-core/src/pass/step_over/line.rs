@@ -185,8 +185,8 @@ impl NeighbourLine {
         };
     }
 
-    /// Places the line: by the expected step, or by the step that the samples of this pass so far allow; at most at the end of these spans, those of the surface that
-    /// are in the store.
+    /// Places the line at the expected step, or at the step that the stations of this pass so far allow, but not beyond the end of the first `spans` side spans, which are in the
+    /// store.
     fn place(
         &mut self,
         job: &Job<'_>,
