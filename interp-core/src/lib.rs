@@ -9,7 +9,7 @@
 //!
 //! /// The job's words: see [`interp_core::job`]. Each sample goes to the axes.
 //! fn machine(header: &Header, words: &[i32], mut axes: impl FnMut(&Sample)) -> Result<(), Fault> {
-//!     // 36 KB besides the store: on a board a `static`.
+//!     // 35 KB besides the store: on a board a `static`.
 //!     let mut machine = Interpolator::<[i32; 1024]>::new();
 //!     machine.load_begin(header, words.len() as u32)?;
 //!     machine.load_words(0, words)?;
