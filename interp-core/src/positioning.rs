@@ -15,7 +15,7 @@
 mod line;
 
 use crate::math::arith::sqrt;
-use crate::math::number::{Bounded, cube_root, to_f32, to_quanta};
+use crate::math::number::{Bounded, cube_root, integer_part, to_f32};
 
 pub use line::{Line, LineLimits};
 
@@ -42,7 +42,7 @@ impl MoveLimits {
     #[must_use]
     pub fn new(velocity: f32, acceleration: f32, jerk: f32, period_s: f32) -> Self {
         let nm = crate::math::number::NM_PER_MM_F32 * ONE * period_s;
-        let unit = |value: f32| to_quanta(value.at_most(MOST)).max(1);
+        let unit = |value: f32| integer_part(value.at_most(MOST)).max(1);
         Self {
             velocity: unit(velocity * nm),
             acceleration: unit(acceleration * nm * period_s),
@@ -54,7 +54,7 @@ impl MoveLimits {
     #[must_use]
     pub fn at_speed(self, velocity: f32, period_s: f32) -> Self {
         let nm = crate::math::number::NM_PER_MM_F32 * ONE * period_s;
-        let velocity = to_quanta((velocity * nm).at_most(MOST)).max(1);
+        let velocity = integer_part((velocity * nm).at_most(MOST)).max(1);
         Self {
             velocity: velocity.min(self.velocity),
             ..self
@@ -140,7 +140,7 @@ fn estimate(distance: i64, limits: &MoveLimits) -> [i64; 2] {
     };
     #[allow(clippy::cast_precision_loss, reason = "2^16 is exact")]
     let most = RAMP_MAX as f32;
-    [jerk, acceleration].map(|periods| to_quanta(periods.at_most(most)))
+    [jerk, acceleration].map(|periods| integer_part(periods.at_most(most)))
 }
 
 /// Periods of constant jerk.

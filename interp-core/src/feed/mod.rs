@@ -48,7 +48,7 @@ mod walk;
 #[cfg(test)]
 mod tests;
 
-use crate::math::number::to_quanta;
+use crate::math::number::integer_part;
 
 /// Units of 2^-10 nm in a millimetre. Arcs are sums of these units, so that they are exact.
 pub(crate) const Q10_PER_MM: f32 = 1_024e6;
@@ -61,5 +61,5 @@ pub(crate) const Q10_BITS: u32 = 10;
 
 /// A length of at least 0 in units of 2^-10 nm, rounded.
 pub(crate) fn to_q10(mm: f32) -> i64 {
-    to_quanta(mm * Q10_PER_MM + 0.5)
+    integer_part(mm * Q10_PER_MM + 0.5)
 }

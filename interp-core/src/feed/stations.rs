@@ -30,7 +30,7 @@ pub(crate) struct Station {
 pub(crate) struct Stations {
     list: [Station; STATIONS_MAX],
     count: u16,
-    /// Cells between the stations of a patch, whose [`parts_of_cell`] derivatives were taken over, and patches of which the outer stations are kept; no cells where derivatives were
+    /// Cells between the stations of a patch, over whose [`parts_of_cell`] derivatives were taken, and patches of which the outer stations are kept; no cells where derivatives were
     /// taken over others.
     cells: u16,
     group: u16,
@@ -92,7 +92,7 @@ impl Stations {
         self.spacing = f32::MAX;
     }
 
-    /// Derivatives are taken over the parts of the cells between stations: of so many in a patch, or of a patch where those of a group are kept together.
+    /// Derivatives are taken over the [`parts_of_cell`]: `cells` in each patch; of `group` patches the outer stations are kept.
     pub(crate) const fn note_cells(&mut self, cells: u16, group: u16) {
         (self.cells, self.group) = (cells, group);
     }

@@ -43,20 +43,20 @@ pub(crate) fn nm_to_mm(nm: i32) -> f32 {
 /// 2^32.
 const HIGH: f32 = 4_294_967_296.0;
 
-/// An arc in units of 2^-10 nm as a float, rounded to 24 bits, sufficient for a bound.
+/// An integer, as of units of 2^-10 nm, as a float: rounded to 24 bits, sufficient for a bound.
 #[allow(
     clippy::cast_precision_loss,
     clippy::cast_possible_truncation,
     reason = "halves of 32 bits; 24 bits are enough for a bound"
 )]
 #[inline(always)]
-pub(crate) const fn to_f32(quanta: i64) -> f32 {
-    let size = quanta.unsigned_abs();
+pub(crate) const fn to_f32(units: i64) -> f32 {
+    let size = units.unsigned_abs();
     let size = (size >> 32) as u32 as f32 * HIGH + size as u32 as f32;
-    if quanta < 0 { -size } else { size }
+    if units < 0 { -size } else { size }
 }
 
-/// The integer part of a number of units of 2^-10 nm; 0 where it is not positive.
+/// The integer part of a number; 0 where it is not positive.
 #[allow(
     clippy::cast_precision_loss,
     clippy::cast_possible_truncation,
@@ -64,7 +64,7 @@ pub(crate) const fn to_f32(quanta: i64) -> f32 {
     reason = "halves of 32 bits; the casts saturate, and a NaN becomes 0"
 )]
 #[inline(always)]
-pub(crate) const fn to_quanta(value: f32) -> i64 {
+pub(crate) const fn integer_part(value: f32) -> i64 {
     let high = (value * (1.0 / HIGH)) as u32;
     let low = (value - high as f32 * HIGH) as u32;
     (high as i64) << 32 | low as i64
@@ -97,15 +97,18 @@ mod tests {
             let (ours, exact) = (f64::from(to_f32(value)), value as f64);
             prop_assert!((ours - exact).abs() <= exact.abs() * 1.2e-7);
             let float = value.unsigned_abs() as f32;
-            prop_assert_eq!(to_quanta(float), float as i64);
-            prop_assert_eq!(to_quanta(fraction), fraction as i64);
+            prop_assert_eq!(integer_part(float), float as i64);
+            prop_assert_eq!(integer_part(fraction), fraction as i64);
         }
     }
 
     #[test]
     fn conversions_at_the_ends() {
         assert_eq!((to_f32(0), to_f32(-1), to_f32(-5)), (0.0, -1.0, -5.0));
-        assert_eq!((to_quanta(-3.0), to_quanta(f32::NAN), to_quanta(0.7)), (0, 0, 0));
+        assert_eq!(
+            (integer_part(-3.0), integer_part(f32::NAN), integer_part(0.7)),
+            (0, 0, 0)
+        );
     }
 
     #[test]
