@@ -363,6 +363,8 @@ impl CurveCursor {
 impl Course for Curve {
     type Cursor = CurveCursor;
 
+    const IS_KNOWN_BETWEEN: bool = true;
+
     fn advance(&self, cursor: &mut CurveCursor, seconds: f32) {
         let mut left = seconds;
         // A period may end a ramp and a cruise of each piece.
@@ -408,12 +410,12 @@ impl Course for Curve {
         // The jerk steps, and the acceleration may change its sign, between two places.
         let around = r * around;
         let accelerations = self.accelerations_beside(cursor, [around; 2], v);
-        let [before, behind] = self.jerk_beside(cursor, around, v);
+        let jerks = self.jerks_beside(cursor, around, [v, j]);
         let [one, other] = accelerations.map(|a| (a * r * r + v * r1).abs());
         let fastest = fastest_around([v, a, j], around);
         let [by_one, by_other] = accelerations.map(|a| 3.0 * a * r * r1);
-        let least = j.at_most(before).at_most(behind) * r * r * r + by_one.at_most(by_other);
-        let greatest = j.at_least(before).at_least(behind) * r * r * r + by_one.at_least(by_other);
+        let least = jerks[0] * r * r * r + by_one.at_most(by_other);
+        let greatest = jerks[1] * r * r * r + by_one.at_least(by_other);
         let [least, greatest] = [least, greatest].map(|jerk| (jerk + fastest * r2).abs());
         Use {
             feed: 0.0,
@@ -437,25 +439,16 @@ impl Course for Curve {
         let [v, a, j] = self.piece(cursor.piece).rates(cursor.time);
         let limits = &self.limits;
         let mut span = Span::WIDE;
-        // The acceleration may change its sign within a slot. r' at the end of the slot is within the limits up to the end of the next one, and
-        // r' at its start, the end of the one before, up to its own end: so is each r' between them.
+        // The acceleration may change its sign within a slot: what follows up to the middle of the slot belongs to its begin.
         let around = r * around;
-        let next = around + r * slot_s;
-        let most = room.acceleration * limits.acceleration;
-        let at = (self.accelerations_beside(cursor, [around, next], v)).map(|a| a * r * r);
-        for speed in [v, fastest_around([v, a, j], next)] {
-            span.add_acceleration(at, speed, most);
-        }
-        // The speed changes over the time around the place, and the jerk steps.
         let fastest = fastest_around([v, a, j], around);
-        let by_first = self
-            .accelerations_beside(cursor, [around; 2], v)
-            .map(|a| 3.0 * a * r);
-        let [one_slope, other_slope] = by_first;
-        let [before, behind] = self.jerk_beside(cursor, around, v);
-        let least = j.at_most(before).at_most(behind) * r * r * r;
-        let greatest = j.at_least(before).at_least(behind) * r * r * r;
-        let [one, other] = by_first.map(|by_first| by_first * first);
+        let accelerations = self.accelerations_beside(cursor, [around, around + 0.5 * r * slot_s], v);
+        let at = accelerations.map(|a| a * r * r);
+        span.add_acceleration(at, fastest, room.acceleration * limits.acceleration);
+        // The speed changes over the time around the place, and the jerk steps.
+        let [one_slope, other_slope] = accelerations.map(|a| 3.0 * a * r);
+        let [one, other] = [one_slope * first, other_slope * first];
+        let [least, greatest] = self.jerks_beside(cursor, around, [v, j]).map(|j| j * r * r * r);
         span.add_jerk(
             [least + one.at_most(other), greatest + one.at_least(other)],
             [
@@ -495,8 +488,8 @@ impl Curve {
         range
     }
 
-    /// Jerk this time before and behind a place with this speed.
-    fn jerk_beside(&self, cursor: &CurveCursor, around: f32, speed: f32) -> [f32; 2] {
+    /// Least and greatest jerk this time before, at, and behind a place with this speed and jerk.
+    fn jerks_beside(&self, cursor: &CurveCursor, around: f32, [speed, here]: [f32; 2]) -> [f32; 2] {
         let piece = self.piece(cursor.piece);
         let jerk = |piece: &Piece, time: f32| {
             let [_, _, jerk] = piece.rates(time);
@@ -517,7 +510,10 @@ impl Curve {
         } else {
             jerk(piece, cursor.time + around)
         };
-        [before, behind]
+        [
+            here.at_most(before).at_most(behind),
+            here.at_least(before).at_least(behind),
+        ]
     }
 
     const fn is_last(&self, piece: u8) -> bool {

@@ -13,51 +13,59 @@ use crate::math::number::{Bounded, to_f32};
 pub(crate) use super::change::Change;
 pub(crate) use super::room::{Use, room_of};
 
-/// Periods from the start of a search to the change that it finds, for the search: some, and as many as some places take; those of a quintic, as a multiple of the
-/// shortest one's.
+/// Periods from the start of a search to the begin of the change that it finds: these, and one per [`PLACES_A_PERIOD`] places that the search may take.
 const LATENCY: u16 = 5;
+const LATENCY_OF_PROFILE: u16 = 3;
+const LATENCY_ABOVE: u16 = 3;
 const PLACES_A_PERIOD: f32 = 11.0;
-const QUINTIC_PLACES: f32 = 1.3;
-/// The most of it, and steps in which the place there is found.
+/// Most periods of it.
 const LATENCY_MAX: u16 = 96;
+/// Most steps in which the place at the begin of a change is found.
 const STEPS_AHEAD: u16 = 24;
 
-/// How slowly the part of a change that is tried decreases with the failures: with as many it is half.
-const WHOLE_CHANGE: f32 = 2.0;
-
-/// The same of a profile: least periods, and places for the shortest change, as a multiple of its slots.
-const LATENCY_OF_PROFILE: u16 = 3;
+/// Places that a search takes, as a multiple of those of the shortest change: of a quintic, a profile, a profile of the finest slots, and a pace above 1.
+const QUINTIC_PLACES: f32 = 1.3;
 const PROFILE_PLACES: f32 = 2.5;
 const PLACES_FINE: f32 = 1.4;
-/// Least duration of a slot of a profile, s, and where that fails.
+const ABOVE_PLACES: f32 = 1.4;
+
+/// Failures after which half of the wanted change is tried.
+const WHOLE_CHANGE: f32 = 2.0;
+
+/// Least duration of a profile's slot, s.
 const SLOT_MIN: f32 = 2e-3;
+/// Duration of a slot where the course is uneven, and after two attempts that failed, s.
 const SLOT_FINE: f32 = 1e-3;
-/// Slots of the shortest change that are enough; fewer than that would be longer than this share of [`Course::ramp_s`], and the acceleration would change its
-/// sign within one. The most.
+/// Factor on the duration of a slot after a search that did not end in time.
+const SLOT_COARSER: f32 = 2.0;
+/// Slots of the shortest change, from which the duration of a slot follows.
 const SLOTS_ENOUGH: f32 = 80.0;
+/// Longest slot as a share of [`Course::ramp_s`]: within a longer one the acceleration would change its sign.
 const SLOT_OF_RAMP: f32 = 0.5;
+/// Most slots of the shortest change.
 const SLOTS_MOST: f32 = 250.0;
 /// Longest period with profiles, s.
 const PROFILE_PERIOD_MAX: f32 = 2.5e-3;
 
-/// The same of a pace above 1.
-const LATENCY_ABOVE: u16 = 3;
-const ABOVE_PLACES: f32 = 1.4;
-/// Time before its return at which a further pace above 1 is sought, s; periods after a search that found none until the next.
+/// Time before the end of a pace above 1 at which the next one is sought, s.
 const RENEWED_S: f32 = 0.12;
+/// Periods from a search for a pace above 1 that failed to the next.
 const ABOVE_WAIT: u16 = 40;
-/// The greatest pace of the first change above 1, so that it is short and soon found.
+/// Greatest pace of the first change above 1, so that it is short and soon found.
 const ABOVE_FIRST: f32 = 1.25;
-/// Greatest share of the velocity limits above 1, and difference between two paces above 1 that are one.
+/// Greatest share of the velocity limits at a pace above 1.
 const ABOVE_VELOCITY: f32 = 0.996;
+/// Two paces above 1 of a smaller difference are one.
 const ABOVE_SAME: f32 = 0.01;
 
-/// Duration of a stop for which a shorter one is sought, s, and how often: the next plan, for which it is made, has to wait.
+/// A stop of a longer duration, s, is searched for again, because the next plan has to wait for its end.
 const LONG_STOP_S: f32 = 0.35;
+/// How often.
 const LONG_STOP_SEARCHES: u8 = 2;
 
-/// Longest stop that the first searches try, as a multiple of the shortest, and their number: one that begins behind a place that leaves little ends earlier.
+/// Longest stop that the first searches try, as a multiple of the shortest: one that begins behind a place that leaves little ends earlier.
 const SHORT: f32 = 1.6;
+/// Number of these searches.
 const SHORT_SEARCHES: u8 = 5;
 
 /// Searches that find nothing from rest, after which the next plan comes first.
@@ -70,6 +78,9 @@ const SAME: f32 = 1e-6;
 pub(crate) trait Course {
     /// A place on it.
     type Cursor: Copy;
+
+    /// Whether [`Self::span_at`] holds for the whole of a slot, however long: a shorter one tells nothing more.
+    const IS_KNOWN_BETWEEN: bool = false;
 
     /// Moves on by this time at the plan's own pace, s.
     fn advance(&self, cursor: &mut Self::Cursor, seconds: f32);
@@ -417,7 +428,7 @@ impl<C: Copy> Pace<C> {
         let slot_s = if is_uneven {
             finest
         } else {
-            self.slot(shortest, course.ramp_s())
+            self.slot::<P>(shortest, course.ramp_s())
         };
         let (least, places) = if makes_profile {
             let share = if is_uneven { PLACES_FINE } else { PROFILE_PLACES };
@@ -436,6 +447,7 @@ impl<C: Copy> Pace<C> {
             search.limit(SHORT * shortest);
         }
         if makes_profile {
+            let finest = if P::IS_KNOWN_BETWEEN { slot_s } else { finest };
             search.make_profile(course, profiles, [slot_s, finest]);
         }
         Some(search)
@@ -546,10 +558,12 @@ impl<C: Copy> Pace<C> {
     }
 
     /// Duration of a slot, s: whole periods.
-    fn slot(&self, shortest: f32, ramp_s: f32) -> f32 {
-        let wanted = (shortest * (1.0 / SLOTS_ENOUGH)).at_most(SLOT_OF_RAMP * ramp_s);
+    fn slot<P: Course<Cursor = C>>(&self, shortest: f32, ramp_s: f32) -> f32 {
+        let wanted = (shortest * (1.0 / SLOTS_ENOUGH)).at_least(SLOT_MIN);
+        let is_late = P::IS_KNOWN_BETWEEN && self.timeouts > 0;
+        let coarser = if is_late { SLOT_COARSER } else { 1.0 };
         let least = SLOT_MIN.at_least(shortest * (1.0 / SLOTS_MOST));
-        self.slot_of(wanted.at_least(least))
+        self.slot_of((coarser * wanted).at_most(SLOT_OF_RAMP * ramp_s).at_least(least))
     }
 
     /// Whole periods, s.

@@ -8,9 +8,11 @@ use crate::math::number::Bounded;
 
 /// Segments of a profile: slots in a row of the same r''.
 const SEGMENTS: usize = 64;
+/// One of them, as a share.
 const PART_OF_SEGMENTS: f32 = 1.0 / 64.0;
-/// Most slots of a segment, and of a profile.
+/// Most slots of a segment.
 const SLOTS_A_SEGMENT: u32 = 0xff;
+/// Most slots of a profile.
 const SLOTS_MAX: u16 = 400;
 /// Most slots that a place moves on by at once.
 const SLOTS_A_STEP: u8 = 8;
@@ -18,14 +20,17 @@ const SLOTS_A_STEP: u8 = 8;
 const ROUNDING: f32 = 1e-3;
 /// Difference of r'' from the one that is best, as a share of it, for which a segment goes on.
 const SAME: f32 = 0.08;
-/// Factor on [`SAME`] where segments run short, and its greatest value (1 would accept any difference). A new segment takes less than the best r''
-/// by the share [`LESS`] of that difference, so that it can go on where the axes leave less.
+/// Factor on that difference after an attempt that ran out of segments.
 const COARSER: f32 = 2.5;
+/// Greatest difference: 1 would accept any r''.
 const COARSEST: f32 = 0.6;
+/// Share of the difference by which a new segment takes less than the best r'', so that it can go on where the axes leave less.
 const LESS: f32 = 0.5;
-/// The same where half of the segments are taken, or so many more than the share of the way to the goal; and where it is the most.
+/// Difference where segments become few.
 const COARSE: f32 = 0.3;
+/// Share of the segments that is taken, from which on the difference is [`COARSE`], and [`COARSEST`].
 const TAKEN: [f32; 2] = [0.5, 0.75];
+/// The same by how much that share is ahead of the share of the way to the goal.
 const TAKEN_BEYOND: [f32; 2] = [0.1, 0.3];
 /// Paces that differ by less count as equal.
 const SAME_PACE: f32 = 1e-6;
@@ -44,11 +49,13 @@ const FIRST_MAX: f32 = 0.05;
 /// Parts of the best r'' that are tried where it is too much before the goal.
 const PARTS: [f32; 4] = [1.0, 0.5, 0.25, 0.125];
 
-/// Attempts that are made; share of r' that the next one takes up to where nothing was allowed; shares of r'' with which the first one
-/// comes to rest at the goal, and the next one where that was too much.
+/// Most attempts.
 const ATTEMPTS: u8 = 6;
+/// Share of r' that the next attempt takes up to where nothing was allowed, once.
 const SLOWER: f32 = 0.55;
+/// Share of r'' with which the first attempt comes to rest at the goal.
 const TO_REST: f32 = 0.9;
+/// Factor on that share where it was too much.
 const LESS_TO_REST: f32 = 0.75;
 /// Share of the range of r'' that the next slot is assumed to have at least.
 const HALF_KEPT: f32 = 0.85;
@@ -481,7 +488,13 @@ impl Making {
         let [_, allowed] = span.first;
         let is_too_fast = first + low * slot_s > allowed + BEYOND * allowed.abs();
         if low > high || is_too_fast {
-            self.most = SLOWER * first.at_most(self.most).at_least(0.0);
+            // Where a slower change fails as well, the pace is constant up to there, which every limit allows.
+            let is_first = self.slots > self.until;
+            self.most = if is_first {
+                SLOWER * first.at_least(0.0)
+            } else {
+                0.0
+            };
             self.until = self.until.max(self.slots + 1);
             return None;
         }
@@ -554,7 +567,7 @@ impl Making {
         if self.attempt == FINE && slot_s > self.finest {
             // Places that are closer together tell apart what happens at them, as at a patch boundary.
             slot_s = self.finest;
-            (self.most, self.to_rest) = (f32::MAX, TO_REST);
+            (self.most, self.until, self.to_rest) = (f32::MAX, 0, TO_REST);
         }
         profile.clear(profile.start, profile.goal, slot_s);
         if self.attempt < ATTEMPTS {

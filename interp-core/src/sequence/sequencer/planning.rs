@@ -28,11 +28,11 @@ const SPARE_BEFORE_TURN: u32 = 30;
 /// step-over's planning.
 const PACE_CYCLES: u32 = 2_950;
 const PACE_BEGIN_CYCLES: u32 = 14_000;
-const LINK_PACE_CYCLES: u32 = 2_600;
+const LINK_PACE_CYCLES: u32 = 2_300;
 const STEP_OVER_CYCLES: u32 = 6_000;
 
 /// Cycles of the same of a hop, and of its planning.
-const HOP_PACE_CYCLES: u32 = 4_200;
+const HOP_PACE_CYCLES: u32 = 3_700;
 const HOP_CYCLES: u32 = 24_000;
 
 /// Cycles of the first sample of a pass that is prepared.
