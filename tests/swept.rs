@@ -184,8 +184,8 @@ fn ball_between_two_lips() {
     let profile: Vec<[f64; 2]> = half.into_iter().chain(other).collect();
     let job = groove(&profile, "scallop_mm = 0.05\nside = \"up\"\n");
     let found = findings(&job);
-    let hollow = found.shape.concave_radius.unwrap();
-    assert!(hollow.radius_mm > job.radius_mm, "{hollow:?}");
+    let concave = found.shape.concave_radius.unwrap();
+    assert!(concave.radius_mm > job.radius_mm, "{concave:?}");
     let gouge = found.gouge.unwrap();
     assert!(!gouge.local && gouge.depth_mm > 1.0, "{gouge:?}");
     // The gouged point and the contact that causes the gouge are on opposite sides of the slot.
