@@ -18,9 +18,9 @@ const LATENCY: u16 = 5;
 const LATENCY_OF_PROFILE: u16 = 3;
 const LATENCY_ABOVE: u16 = 3;
 const PLACES_A_PERIOD: f32 = 11.0;
-/// Most periods of it.
+/// Most periods of a latency.
 const LATENCY_MAX: u16 = 96;
-/// Most steps in which the place at the begin of a change is found.
+/// Most steps over the latency, in which the place where a change begins is found.
 const STEPS_AHEAD: u16 = 24;
 
 /// Places that a search takes, as a multiple of those of the shortest change: of a quintic, a profile, a profile of the finest slots, and a pace above 1.
@@ -60,7 +60,7 @@ const ABOVE_SAME: f32 = 0.01;
 
 /// A stop of a longer duration, s, is searched for again, because the next plan has to wait for its end.
 const LONG_STOP_S: f32 = 0.35;
-/// How often.
+/// Most searches for a shorter one.
 const LONG_STOP_SEARCHES: u8 = 2;
 
 /// Longest stop that the first searches try, as a multiple of the shortest: one that begins behind a place that leaves little ends earlier.

@@ -8,7 +8,7 @@ use crate::math::number::Bounded;
 
 /// Segments of a profile: slots in a row of the same r''.
 const SEGMENTS: usize = 64;
-/// One of them, as a share.
+/// Share of the segments that one is.
 const PART_OF_SEGMENTS: f32 = 1.0 / 64.0;
 /// Most slots of a segment.
 const SLOTS_A_SEGMENT: u32 = 0xff;
@@ -20,7 +20,7 @@ const SLOTS_A_STEP: u8 = 8;
 const ROUNDING: f32 = 1e-3;
 /// Difference of r'' from the one that is best, as a share of it, for which a segment goes on.
 const SAME: f32 = 0.08;
-/// Factor on that difference after an attempt that ran out of segments.
+/// Factor on the difference [`SAME`] after an attempt that ran out of segments.
 const COARSER: f32 = 2.5;
 /// Greatest difference: 1 would accept any r''.
 const COARSEST: f32 = 0.6;
@@ -30,7 +30,7 @@ const LESS: f32 = 0.5;
 const COARSE: f32 = 0.3;
 /// Share of the segments that is taken, from which on the difference is [`COARSE`], and [`COARSEST`].
 const TAKEN: [f32; 2] = [0.5, 0.75];
-/// The same by how much that share is ahead of the share of the way to the goal.
+/// Lead of that share over the share of the way to the goal, from which on the difference is [`COARSE`], and [`COARSEST`].
 const TAKEN_BEYOND: [f32; 2] = [0.1, 0.3];
 /// Paces that differ by less count as equal.
 const SAME_PACE: f32 = 1e-6;

@@ -141,7 +141,7 @@ impl StepOverEstimator {
     /// Side parameter of the pass after the one at `from`, by the step to it.
     ///
     /// # Errors
-    /// Those of [`schedule::next_side`].
+    /// Those of [`next_side`](crate::pass::schedule::next_side).
     pub(crate) fn next_side(&self, job: &Job<'_>, from: SpanParameter, step: f32) -> Result<SpanParameter> {
         self.rows
             .next_side(job.header, from, step, |span| job.side_width(span))

@@ -13,7 +13,7 @@ const JUMP: u32 = 3_500;
 const CHECK: u32 = 1_900;
 const GATE: u32 = 2_950;
 const GATE_PLACE: u32 = 22_000;
-/// [`Stage::Scale`](super::Stage::Scale) of a plan with a turn.
+/// [`Stage::Scale`] of a plan with a turn.
 const BLEND: u32 = 25_000;
 /// Work on each coefficient, for the greatest number of them.
 const LIST: u32 = 15_000;

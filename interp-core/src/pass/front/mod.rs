@@ -22,7 +22,7 @@
 //! | [`crest`] | the height between two fronts, measured by the balls |
 //! | [`advance`] | the next front, in portions |
 //! | [`cost`] | cycles of the portions |
-//! | [`line`] | a pass on a front, and its pieces |
+//! | [`line`](mod@line) | a pass on a front, and its pieces |
 //! | [`part`] | the parts of a front before the boundary |
 //! | [`clip`] | those within a region |
 //! | [`sequence`] | the passes in order |

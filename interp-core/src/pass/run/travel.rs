@@ -36,7 +36,7 @@ pub(super) struct Travel {
     pub(super) log_speed_derivative_before: f32,
     /// r N at the last sample, in the ball's units.
     pub(super) offset: [i32; 3],
-    /// Maximum inverse square interval of the pass, with the surface's curvature at that sample; see [`PassMaximum`].
+    /// Maximum inverse square interval of the pass, with the surface's curvature at that sample; see [`PassMaximum`](crate::pass::step_over::PassMaximum).
     pub(super) max_inv_interval_sq: f32,
     pub(super) shape: [f32; 2],
     /// Samples so far.

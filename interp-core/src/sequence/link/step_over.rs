@@ -269,7 +269,7 @@ impl BoundaryStepOver {
     /// Plans one portion.
     ///
     /// # Errors
-    /// The fault of the surface at a station; [`FaultKind::SoftLimit`] where a station is outside the travel.
+    /// The fault of the surface at a station; [`FaultKind::SoftLimit`](crate::FaultKind::SoftLimit) where a station is outside the travel.
     #[inline(never)]
     pub(crate) fn work(&mut self, job: &Job<'_>, axes: &AxisLimits) -> Result<()> {
         self.task = match self.task {
