@@ -63,11 +63,17 @@ pub fn chords(
     chord_mm: f64,
     feed_mm_s: f64,
 ) -> Result<Vec<Chord>, ApproachError> {
-    let mut chords = Vec::new();
+    between(pass, rule, &ends(pass, rule, chord_mm)?, feed_mm_s)
+}
+
+/// The points between which the chords are, by a rule: none on a pass that is a single point.
+fn ends(pass: &PassPath<'_>, rule: Chords, chord_mm: f64) -> Result<Vec<OffsetPoint>, ApproachError> {
+    let mut points = Vec::new();
     if pass.is_point() {
-        return Ok(chords);
+        return Ok(points);
     }
     let mut at = pass.at(pass.ends[0])?;
+    points.push(at);
     // Bounded: every step is above the range times 2^-HALVINGS, and in practice by the length over sqrt(8 rho delta).
     while pass.left(at.path) > 0.0 {
         let step = match rule {
@@ -81,21 +87,34 @@ pub fn chords(
         } else {
             at.path + step * pass.sense()
         };
-        let next = pass.at(path)?;
+        at = pass.at(path)?;
+        points.push(at);
+    }
+    Ok(points)
+}
+
+/// The chords between these points, with their speeds.
+fn between(
+    pass: &PassPath<'_>,
+    rule: Chords,
+    points: &[OffsetPoint],
+    feed_mm_s: f64,
+) -> Result<Vec<Chord>, ApproachError> {
+    let chord = |pair: &[OffsetPoint]| {
+        let [at, next] = [&pair[0], &pair[1]];
         let cc = match rule {
-            Chords::Held => arc_mm(pass, at.path, path)?,
+            Chords::Held => arc_mm(pass, at.path, next.path)?,
             Chords::Equation | Chords::EquationNormal => next.contact.cc_mm.distance(at.contact.cc_mm),
         };
         let cl = next.contact.cl_mm.distance(at.contact.cl_mm);
-        chords.push(Chord {
-            path,
+        Ok(Chord {
+            path: next.path,
             from_mm: at.contact.cl_mm,
             to_mm: next.contact.cl_mm,
             speed_mm_s: feed_mm_s * if cc > 0.0 { cl / cc } else { 1.0 },
-        });
-        at = next;
-    }
-    Ok(chords)
+        })
+    };
+    points.windows(2).map(chord).collect()
 }
 
 /// The least number of chords within the limit, with equalised errors. Otherwise the last chord is the remainder, and a chord of
@@ -104,16 +123,16 @@ pub fn chords(
 /// # Errors
 /// As [`chords`].
 pub fn even_chords(pass: &PassPath<'_>, chord_mm: f64, feed_mm_s: f64) -> Result<Vec<Chord>, ApproachError> {
-    let mut best = chords(pass, Chords::Held, chord_mm, feed_mm_s)?;
+    let mut best = ends(pass, Chords::Held, chord_mm)?;
     let (mut low, mut high) = (0.5, 1.0);
     for _ in 0..EVENING {
         let share = 0.5 * (low + high);
-        match chords(pass, Chords::Held, share * chord_mm, feed_mm_s) {
+        match ends(pass, Chords::Held, share * chord_mm) {
             Ok(found) if found.len() <= best.len() => (best, high) = (found, share),
             _ => low = share,
         }
     }
-    Ok(best)
+    between(pass, Chords::Held, &best, feed_mm_s)
 }
 
 /// Length of the contact's path over a chord, mm: where that bends within a tenth of a millimetre, it is 1 % above the chord of eqn 7.

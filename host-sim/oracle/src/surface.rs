@@ -120,8 +120,12 @@ fn revolved(radius: &[f64; 4], height: &[f64; 4], u: f64, v: f64) -> Derivatives
 
 /// `(1 - v) rail0(u) + v rail1(u)`.
 fn ruled(rails: &[[[f64; 4]; 3]; 2], u: f64, v: f64) -> Derivatives {
+    let rails = rails
+        .each_ref()
+        .map(|[x, y, z]| [cubic(x, u), cubic(y, u), cubic(z, u)]);
     let rail = |index: usize, order: usize| {
-        DVec3::from_array(rails[index].each_ref().map(|axis| cubic(axis, u)[order]))
+        let [x, y, z] = rails[index];
+        DVec3::new(x[order], y[order], z[order])
     };
     let between = |order: usize| rail(0, order) * (1.0 - v) + rail(1, order) * v;
     Derivatives {
