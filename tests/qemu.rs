@@ -75,9 +75,10 @@ fn compare(names: &[&str]) {
 }
 
 fn compare_prepared(jobs: &[(&str, Prepared)]) {
+    // Before QEMU starts, which takes a processor while it waits.
+    let jobs: Vec<_> = jobs.iter().map(|(name, job)| (name, job, here(job))).collect();
     let (_qemu, mut session) = board();
-    for (name, job) in jobs {
-        let (passes, digest) = here(job);
+    for (name, job, (passes, digest)) in jobs {
         drive::upload(&mut session, job, |_| {}).unwrap();
         let start = Instant::now();
         let compared = drive::run_digests(&mut session, &passes, true, None, |_| {}).unwrap();

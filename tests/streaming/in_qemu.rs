@@ -16,6 +16,14 @@ use protocol::message::{Configuration, Report, Request};
 use super::{LIMITS, bumpy, expected, regions};
 use crate::images;
 
+/// A board, ready to run.
+fn board() -> (Qemu, Session) {
+    let (qemu, stream) = Qemu::start(images::for_qemu()).unwrap();
+    let mut session = Session::open(stream, 1).unwrap();
+    make_ready(&mut session, &Setup::simulated(Configuration::DEFAULT)).unwrap();
+    (qemu, session)
+}
+
 /// Digest of the run after each of its first passes, and its ticks up to there.
 fn first_passes(job: &Prepared, passes: u32) -> (Vec<u64>, u32) {
     let (mut digests, mut digest, mut ticks) = (Vec::new(), Digest::new(), 0);
@@ -34,14 +42,16 @@ fn first_passes(job: &Prepared, passes: u32) -> (Vec<u64>, u32) {
 /// With limits and without: as many passes as cross some rows, so that rows are sent while the tool moves.
 #[test]
 fn the_first_passes_of_a_hundred_rows() {
-    let (_qemu, stream) = Qemu::start(images::for_qemu()).unwrap();
-    let mut session = Session::open(stream, 1).unwrap();
-    make_ready(&mut session, &Setup::simulated(Configuration::DEFAULT)).unwrap();
     let cut = "scallop_mm = 0.04\npattern = \"zigzag\"";
-    for (machine, passes) in [("", 18), (LIMITS, 12)] {
+    // Before QEMU starts, which takes a processor while it waits.
+    let jobs = [("", 18), (LIMITS, 12)].map(|(machine, passes)| {
         let job = prepare(&bumpy([100, 100], [0.5, 0.8], cut, machine)).unwrap();
         assert_eq!((job.patches(), job.header.window), (10_000, 3));
-        let (wanted, ticks) = first_passes(&job, passes);
+        let expected = first_passes(&job, passes);
+        (job, passes, expected)
+    });
+    let (_qemu, mut session) = board();
+    for (job, passes, (wanted, ticks)) in jobs {
         drive::upload(&mut session, &job, |_| {}).unwrap();
         session
             .command(&Request::Clock(protocol::message::Clock::Lockstep))
@@ -80,10 +90,7 @@ fn the_first_passes_of_a_hundred_rows() {
 /// A region of 12 x 32 patches, more than the store holds, in cells and with links, without turns and with them: the whole runs.
 #[test]
 fn regions_of_more_patches_than_the_store() {
-    let (_qemu, stream) = Qemu::start(images::for_qemu()).unwrap();
-    let mut session = Session::open(stream, 1).unwrap();
-    make_ready(&mut session, &Setup::simulated(Configuration::DEFAULT)).unwrap();
-    for overrun_mm in [0.0, 2.0] {
+    let jobs = [0.0, 2.0].map(|overrun_mm| {
         let mut job = regions::in_cells(4, [12, 32], regions::with_hole(2.0));
         job.overrun_mm = overrun_mm;
         let mut job = prepare(&job).unwrap();
@@ -105,6 +112,10 @@ fn regions_of_more_patches_than_the_store() {
             job.header.window,
             job.least_rows
         );
+        (job, wanted)
+    });
+    let (_qemu, mut session) = board();
+    for (job, wanted) in jobs {
         drive::upload(&mut session, &job, |_| {}).unwrap();
         let ran = drive::run_digests(&mut session, &wanted, true, None, |_| {}).unwrap();
         assert_eq!(ran.status.state, State::Finished, "{:?}", ran.status);
