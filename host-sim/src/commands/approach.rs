@@ -21,7 +21,7 @@ pub(super) fn command(
     directory: Option<WantedReport<'_>>,
     as_json: bool,
 ) -> Result<()> {
-    super::whole_surface(job)?;
+    super::whole_surface(job, "--approach")?;
     let bar = spinner("computing the passes");
     let passes = count_passes(job)?;
     bar.finish_and_clear();

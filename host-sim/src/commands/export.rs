@@ -75,7 +75,7 @@ impl From<ExportError> for Failure {
 
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let (job, _) = load(&arguments.job)?;
-    super::whole_surface(&job)?;
+    super::whole_surface(&job, "export")?;
     output_file::check(&arguments.output, arguments.force)?;
     let options = Options {
         dialect: arguments.format,

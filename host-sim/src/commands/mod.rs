@@ -339,19 +339,29 @@ fn chosen(job: Job) -> Result<(Job, Prepared)> {
     }
 }
 
-/// Refuses passes of a region, which only the board makes.
-fn whole_surface(job: &Job) -> Result<()> {
-    if job.region.is_some() {
-        return Err(job
-            .origin
-            .error(
-                "region",
-                "the other approaches machine a whole surface only",
-                "remove the section [region]",
-            )
-            .into());
+/// Refuses passes of a region, which only the core makes. `who`: what works on whole surfaces.
+fn whole_surface(job: &Job, who: &str) -> Result<()> {
+    if job.region.is_none() {
+        return Ok(());
     }
-    Ok(())
+    let whole = "for the whole surface, without regard to the part: cargo sim import FILE --face N --untrimmed; or machine this job with cargo sim run";
+    let (key, has, remedy) = if job.origin.part().is_some() {
+        (
+            "part",
+            "a face of a part, of which the tool reaches a region",
+            whole,
+        )
+    } else if job.origin.reach().is_some() {
+        ("surface.face", "a trimmed face", whole)
+    } else {
+        (
+            "region",
+            "a section [region]",
+            "remove the section [region], or machine this job with cargo sim run",
+        )
+    };
+    let what = format!("{who} works on whole surfaces only, and this job has {has}");
+    Err(job.origin.error(key, what, remedy).into())
 }
 
 /// A warning of the axis limits that a job sets and that the other approaches do not keep.

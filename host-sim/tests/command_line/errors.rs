@@ -149,6 +149,43 @@ fn unknown_boards_and_images_get_a_remedy() {
     ]);
 }
 
+/// What needs a whole surface says what the job has instead, where, and the remedy.
+#[test]
+fn jobs_of_a_region_are_not_exported() {
+    let folder = folder_with("torus", &[]);
+    let cad = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../jobs/cad/blade.step");
+    std::fs::copy(cad, folder.path().join("blade.step")).unwrap();
+    let region = "\n[region]\nloops = [[[0.1, 0.1], [0.9, 0.1], [0.9, 0.9], [0.1, 0.9]]]\n";
+    let job = std::fs::read_to_string(folder.path().join("job.toml")).unwrap();
+    std::fs::write(folder.path().join("region.toml"), job + region).unwrap();
+    let import = run(
+        folder.path(),
+        "import blade.step --part --tool 3 --scallop-mm 0.2 --faces 2 --up auto -o part.toml",
+    );
+    assert_eq!(import.status.code(), Some(0), "{}", err(&import));
+    for (name, quoted, words) in [
+        ("region.toml", "[region]", "a section [region]"),
+        ("part.toml", "[part]", "a face of a part"),
+    ] {
+        for (command, who) in [
+            (format!("export {name} --format grbl -o x.nc"), "export works"),
+            (format!("simulate {name} --approach linear"), "--approach works"),
+        ] {
+            let output = run(folder.path(), &command);
+            let said = err(&output).replace("\n  │", "");
+            assert_eq!(output.status.code(), Some(2), "{said}");
+            for part in [who, words, "help:", &format!("│ {quoted}")] {
+                assert!(said.contains(part), "{command}: {part} is not in {said}");
+            }
+            assert_eq!(
+                said.contains("remove the section [region]"),
+                name == "region.toml",
+                "{said}"
+            );
+        }
+    }
+}
+
 /// The approaches that export can use are those in its help.
 #[test]
 fn the_help_of_export_names_its_approaches() {
