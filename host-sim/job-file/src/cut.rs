@@ -98,6 +98,27 @@ pub(super) fn check_feed(cut: &Section<'_>, job: &Job) -> Result<(), JobError> {
     Err(cut.error("feed_mm_min", what, "lower the feed, or shorten period_us"))
 }
 
+/// Refuses an overrun of a job that has no turns.
+pub(super) fn check_overrun(cut: &Section<'_>, job: &Job) -> Result<(), JobError> {
+    if job.overrun_mm <= 0.0 {
+        return Ok(());
+    }
+    let (what, remedy) = if job.pattern != Pattern::Zigzag {
+        (
+            "passes in one direction have no turns beyond the boundary",
+            "remove it, or write pattern = \"zigzag\"",
+        )
+    } else if !job.machine.has_limits() {
+        (
+            "without axis limits there are no turns beyond the boundary",
+            "remove it, or give the limits in [machine] or a profile by --machine",
+        )
+    } else {
+        return Ok(());
+    };
+    Err(cut.error("overrun_mm", what, remedy))
+}
+
 /// The rule for the distance between passes, and where passes of constant scallop height start; whether that start is chosen by trials.
 fn read_spacing(cut: &Section<'_>) -> Result<(Spacing, bool), JobError> {
     let starts = [

@@ -195,6 +195,7 @@ fn parse_on(
         origin,
     };
     cut::check_feed(&cut, &job)?;
+    cut::check_overrun(&cut, &job)?;
     if trimmed || job.origin.part().is_some() {
         own_region(&document, &mut job, faces)?;
     }

@@ -323,6 +323,8 @@ fn ranges() {
         (REVOLVED, "scallop_mm = 0.005", "scallop_mm = 10", 14, 14, "below the ball radius of 10 mm, not 10"),
         (REVOLVED, "chord_mm = 0.005", "chord_mm = 0", 18, 12, "`chord_mm` must be above 0"),
         (REVOLVED, "chord_mm = 0.005", "spacing = \"constant\"\noverrun_mm = 2", 19, 14, "no turns beyond the boundary"),
+        (REVOLVED, "chord_mm = 0.005", "overrun_mm = 2", 18, 14, "passes in one direction have no turns"),
+        (NURBS, "side = \"-\"", "side = \"-\"\npattern = \"zigzag\"\noverrun_mm = 2", 23, 14, "without axis limits there are no turns"),
         (REVOLVED, "u = [0, 1]", "u = [1, 0]", 5, 5, "`u` must ascend, not run from 1 to 0"),
         (REVOLVED, "-3.141592653589793", "-9", 6, 9, "more than a full turn"),
         (REVOLVED, "90, 20]", "90, -20]", 3, 13, "the profile's radius is negative: -20 mm at u = 0"),
