@@ -13,6 +13,14 @@ const BALANCE_MIN: f64 = 0.1;
 const UPRIGHT_MIN: f64 = 1e-3;
 /// Distance of the first point near a pole, as a share of the range: near enough for a parabola, far enough for a normal.
 const POLE_STEP: f64 = 1e-4;
+/// Places along a boundary at which it is asked whether it is a point, how far apart they are at most, mm, and how far beside it the surface is looked at, as a share of the
+/// range: near enough for a bowl to be flat.
+const POINT_PLACES: u32 = 24;
+const POINT_MM: f64 = 1e-6;
+const POINT_STEP: f64 = 1e-6;
+/// Least cosine between a normal at a point and the way from there into the surface for a hollow: what is less sinks the ball by less than 13 nm for each
+/// millimetre of its radius.
+const HOLLOW_MIN: f64 = 5e-3;
 /// Ratio of the derivatives' lengths, each times its range, below which the shorter one counts as zero.
 const POLE_SHARE: f64 = 1e-9;
 
@@ -173,6 +181,67 @@ pub(super) fn centre_mm(job: &Job, sign: f64, [u, v]: [f64; 2]) -> Option<DVec3>
     Some(frame.point + sign * job.radius_mm * normal)
 }
 
+/// Checks that no boundary is a point in a hollow, like the tip of a countersink: the core checks the fit of the ball along the pass and across it, and at a point only
+/// along it.
+///
+/// # Errors
+/// Such a boundary, unless a region says what is machined.
+pub(super) fn check_points(job: &Job, sign: f64) -> Result<(), JobError> {
+    if job.region.is_some() {
+        return Ok(());
+    }
+    let surface = SurfaceEvaluator::new(&job.surface);
+    let [us, vs] = job.surface.domain();
+    for along in [Along::U, Along::V] {
+        // A boundary of constant `along`.
+        let (own, other) = match along {
+            Along::U => (us, vs),
+            Along::V => (vs, us),
+        };
+        for [end, from] in [own, [own[1], own[0]]] {
+            if is_hollow_point(&surface, along, [end, from], other, sign) {
+                let name = along.name();
+                return Err(job.origin.error(
+                    "surface",
+                    format!("the boundary {name} = {end} is a point in a hollow, where a ball that touches one side cuts into the other"),
+                    format!("end the surface before the point, by its range of {name}, or draw a [region] that leaves it out"),
+                ));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Whether the boundary of constant `along` at `end` is a point from which the surface rises towards the tool on a side.
+fn is_hollow_point(
+    surface: &SurfaceEvaluator,
+    along: Along,
+    [end, from]: [f64; 2],
+    [low, high]: [f64; 2],
+    sign: f64,
+) -> bool {
+    let at = |own: f64, place: u32| {
+        let other = low + (high - low) * f64::from(place) / f64::from(POINT_PLACES);
+        match along {
+            Along::U => surface.at(own, other),
+            Along::V => surface.at(other, own),
+        }
+    };
+    let tip = at(end, 0).point;
+    if (0..=POINT_PLACES).any(|place| at(end, place).point.distance(tip) > POINT_MM) {
+        return false;
+    }
+    let beside = end + POINT_STEP * (from - end);
+    let sides: Vec<(DVec3, DVec3)> = (0..=POINT_PLACES)
+        .filter_map(|place| {
+            let frame = at(beside, place);
+            Some((sign * unit(frame.u.cross(frame.v))?, unit(frame.point - tip)?))
+        })
+        .collect();
+    let rises = |normal: &DVec3| sides.iter().any(|(_, way)| normal.dot(*way) > HOLLOW_MIN);
+    sides.iter().any(|(normal, _)| rises(normal))
+}
+
 fn unit(a: DVec3) -> Option<DVec3> {
     let size = a.length();
     (size > 0.0 && size.is_finite()).then(|| a / size)
@@ -219,6 +288,33 @@ mod tests {
                 let ours = centre_mm(&job, sign, [us[0], vs[0]]).unwrap();
                 // A nanometre: the machine's own resolution.
                 assert!(ours.distance(exact) < 1e-6, "{name} {side:?}: {ours} for {exact}");
+            }
+        }
+    }
+
+    /// A cone's tip, and the same with a bowl instead.
+    fn tip(rise: [f64; 2], along: &str) -> Job {
+        let [bowl, cone] = rise;
+        let text = format!(
+            "[surface]\nkind = \"revolved\"\nradius_mm = [0, 0, 200, 0]\nheight_mm = [0, {bowl}, {cone}, 0]\nu = [0, 1]\nv_rad = [0, 6.28]\n\
+             [tool]\nkind = \"ball\"\nradius_mm = 3\n[cut]\nfeed_mm_min = 1200\nscallop_mm = 0.05\nalong = \"{along}\"\nside = \"up\"\n"
+        );
+        job_file::parse("tip", &text).unwrap()
+    }
+
+    #[test]
+    fn points_in_hollows_are_refused() {
+        for along in ["u", "v"] {
+            for rise in [[0.0, 200.0], [0.0, 10.0], [100.0, 2.0]] {
+                let error = super::super::prepare(&tip(rise, along)).unwrap_err();
+                assert!(
+                    error.what().contains("u = 0 is a point in a hollow"),
+                    "{along} {rise:?}: {error}"
+                );
+            }
+            // A bowl, a flat, a tip.
+            for rise in [[300.0, 0.0], [0.0, 0.0], [0.0, -200.0], [0.0, -10.0]] {
+                super::super::prepare(&tip(rise, along)).unwrap();
             }
         }
     }

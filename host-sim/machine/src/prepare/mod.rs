@@ -142,6 +142,7 @@ pub fn prepare(job: &Job) -> Result<Prepared, JobError> {
         ));
     }
     let sign = geometry::tool_sign(job)?;
+    geometry::check_points(job, sign)?;
     #[allow(clippy::cast_possible_truncation, reason = "the machine's own precision")]
     let header = Header {
         kind: SurfaceKind::Polynomial,
