@@ -18,6 +18,7 @@ mod house;
 mod images;
 mod import;
 mod job_times;
+mod limits;
 mod lost_events;
 mod manual;
 mod no_panic;

@@ -28,7 +28,7 @@ impl Random {
     }
 
     /// Between two limits above 0, evenly by the logarithm.
-    fn log_within(&mut self, low: f64, high: f64) -> f64 {
+    pub(crate) fn log_within(&mut self, low: f64, high: f64) -> f64 {
         self.within(low.ln(), high.ln()).exp()
     }
 }
