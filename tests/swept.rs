@@ -20,12 +20,7 @@ pub(crate) struct Followed {
 pub(crate) fn follow(job: &Job) -> Followed {
     let oracle = Oracle::new(job).unwrap();
     let prepared = prepare(job).unwrap();
-    // The spacing that `verify` uses: with axis limits the feed is low at the ends of passes, so samples are close together there.
-    let spacing_nm = match prepared.header.axes {
-        Some(_) => 0.5e6 * job.feed_mm_s() * job.machine.period_s(),
-        None => 0.0,
-    };
-    let mut track = ToolPath::with_spacing(spacing_nm, job.scallop_mm);
+    let mut track = ToolPath::of_job(job);
     let mut keep = |emitted: &PassSample, _: &SampleCheck| {
         track.add(emitted, job.along);
     };

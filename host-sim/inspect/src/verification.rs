@@ -174,18 +174,12 @@ struct Meters<'a> {
 
 impl<'a> Meters<'a> {
     fn new(job: &'a Job, oracle: &'a oracle::Oracle) -> Self {
-        // With limits the feed is low at the ends of passes: on straight parts samples closer than half the full step of a period are not stored.
-        let spacing_nm = if job.machine.has_limits() {
-            0.5 * units::NM_PER_MM * job.feed_mm_s() * job.machine.period_s()
-        } else {
-            0.0
-        };
         let least = |limits: job::AxisLimits| limits.jerk_mm_s3.into_iter().fold(f64::INFINITY, f64::min);
         let jerk_mm_s3 = job.machine.limits.map(least);
         Self {
             job,
             oracle,
-            track: ToolPath::with_spacing(spacing_nm, job.scallop_mm),
+            track: ToolPath::of_job(job),
             turn: TurnEnds::new(oracle),
             slow: BTreeMap::new(),
             running: BTreeMap::new(),

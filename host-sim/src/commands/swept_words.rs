@@ -134,6 +134,11 @@ fn um(mm: f64) -> f64 {
     1e3 * mm
 }
 
+/// A length that was given, um, without the rounding of the conversion in its last digits.
+fn given_um(mm: f64) -> f64 {
+    (1e9 * mm).round() / 1e6
+}
+
 /// Prints the figures as text.
 pub(super) fn print(
     job: &Job,
@@ -155,16 +160,17 @@ pub(super) fn print(
             found.cells
         ),
         Some(gouge) => say!(
-            "  {} {:<22} {:.4} um at u = {:.6}, v = {:.6}, by tick {}, pass {}{}",
+            "  {} {:<22} {:.4} um +- {:.4} at u = {:.6}, v = {:.6}, by tick {}, pass {}{}",
             mark(found.gouge_verdict),
             "gouge",
             um(gouge.depth_mm),
+            um(found.gouge_floor_mm),
             gouge.u,
             gouge.v,
             gouge.tick,
             gouge.pass,
             job.origin.part().map_or_else(String::new, |part| {
-                format!(" (at most {}: the part's tolerance)", um(part.tolerance_mm))
+                format!(" (at most {}: the part's tolerance)", given_um(part.tolerance_mm))
             })
         ),
     }
@@ -176,10 +182,10 @@ pub(super) fn print(
                  above the job's surface: limit {}",
                 um(original.above_mm),
                 um(original.below_mm),
-                um(original.tolerance_mm),
-                um(job.scallop_mm + original.tolerance_mm),
+                given_um(original.tolerance_mm),
+                given_um(job.scallop_mm + original.tolerance_mm),
                 um(original.over_surface_mm),
-                um(job.scallop_mm)
+                given_um(job.scallop_mm)
             ),
         );
     }
@@ -240,7 +246,7 @@ fn scallop(job: &Job, found: &SweptResult) {
         "scallop height",
         um(most.height_mm),
         um(found.measurement_error_mm),
-        um(job.scallop_mm),
+        given_um(job.scallop_mm),
         most.height_mm / job.scallop_mm,
         most.passes[0],
         most.passes[1],
@@ -298,6 +304,15 @@ fn travel(job: &Job, found: &SweptResult) {
     }
 }
 
+/// Over which time a figure is reached, and judged within an error, %.
+fn bases(peak: &Peak, error: f64) -> String {
+    let judged = format!("over {:.3} ms within {error:.2} %", 1e3 * peak.base_s);
+    if peak.reached_s == peak.base_s {
+        return format!(", {judged}");
+    }
+    format!(" at least, over {:.3} ms; judged {judged}", 1e3 * peak.reached_s)
+}
+
 fn peaks(axes: &Peaks) {
     for (peak, (name, unit)) in axes.iter().zip(ORDERS) {
         let [x, y, z] = peak.axes;
@@ -312,7 +327,7 @@ fn peaks(axes: &Peaks) {
                         1e3 * peak.base_s
                     )
                 } else {
-                    format!("{figure}, over {:.3} ms within {error:.2} %", 1e3 * peak.base_s)
+                    format!("{figure}{}", bases(peak, error))
                 };
                 (mark(peak.verdict), told)
             }
@@ -327,5 +342,33 @@ fn peaks(axes: &Peaks) {
             "axis limits",
             "none: a job for studying the geometry; for a machine, give them in [machine] or a profile by --machine",
         );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn given_lengths_have_the_digits_that_were_given() {
+        assert_eq!(um(0.00185865).to_string(), "1.8586500000000001");
+        assert_eq!(given_um(0.00185865).to_string(), "1.85865");
+        assert_eq!(given_um(0.005).to_string(), "5");
+    }
+
+    /// A figure over another base than the judged one says so.
+    #[test]
+    fn a_figure_names_the_base_over_which_it_is_reached() {
+        let mut peak = Peak {
+            reached_s: 2e-3,
+            base_s: 6e-3,
+            ..Peak::default()
+        };
+        assert_eq!(
+            bases(&peak, 1.85),
+            " at least, over 2.000 ms; judged over 6.000 ms within 1.85 %"
+        );
+        peak.reached_s = peak.base_s;
+        assert_eq!(bases(&peak, 1.85), ", over 6.000 ms within 1.85 %");
     }
 }

@@ -25,7 +25,7 @@ const LIMITS: AxisLimits = AxisLimits {
     jerk_mm_s3: [20_000.0, 20_000.0, 10_000.0],
 };
 /// Least distance of the samples from which crests are measured, mm. The error of the measurement states what it costs.
-const SAMPLES_MM: f64 = 0.02;
+const SAMPLES_MM: f64 = 0.005;
 
 /// A job with one rule.
 #[derive(Clone, Copy, Debug, PartialEq)]

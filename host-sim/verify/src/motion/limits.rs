@@ -55,6 +55,8 @@ pub struct Peak {
     pub axis: usize,
     /// Use of this axis's limit, 1 = at the limit; `None` without a limit.
     pub share: Option<f64>,
+    /// The base over which this axis's magnitude is reached, s.
+    pub reached_s: f64,
     /// The judged base on this axis, s.
     pub base_s: f64,
     /// Error of a difference over that base, as a share of the limit; 0 without a limit.
@@ -239,6 +241,7 @@ impl PeakMeter {
             ticks: axes.each_ref().map(|judged| judged.tick),
             axis,
             share: limits.map(|_| share(axis)),
+            reached_s: axes[axis].reached_s,
             base_s: axes[axis].base_s,
             uncertainty: limits.map_or(0.0, |limits| error(order, axes[axis].base_s) / limits[axis]),
             verdict: worst.unwrap_or_default(),
@@ -251,6 +254,7 @@ impl PeakMeter {
         let mut judged = Judged {
             reached: 0.0,
             tick: 0,
+            reached_s: self.period_s,
             base_s: self.period_s,
             verdict: Verdict::Unknown,
         };
@@ -269,7 +273,7 @@ impl PeakMeter {
             #[allow(clippy::cast_precision_loss, reason = "below 2^53")]
             let value = largest.nm as f64 * MM_PER_NM / power(base_s, order);
             if value - error > judged.reached {
-                (judged.reached, judged.tick) = (value - error, largest.tick);
+                (judged.reached, judged.tick, judged.reached_s) = (value - error, largest.tick, base_s);
             }
             // Nothing shorter than a period is emitted, so one period is never too long.
             let short = base.periods == 1 || base_s <= longest_s;
@@ -299,6 +303,8 @@ struct Judged {
     /// Largest magnitude that is surely reached, and its tick.
     reached: f64,
     tick: u64,
+    /// The base over which it is reached.
+    reached_s: f64,
     /// The shortest base with a small enough error; a period where there is none.
     base_s: f64,
     verdict: Verdict,

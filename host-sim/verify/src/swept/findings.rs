@@ -45,6 +45,8 @@ pub struct HighestScallop {
     pub passes: [u32; 2],
     /// Point on the surface, mm.
     pub point_mm: DVec3,
+    /// Error bound of this height, mm. Between stations a ridge can only be higher: [`SweptResult::measurement_error_mm`].
+    pub error_mm: f64,
 }
 
 /// The deepest gouge.
@@ -120,7 +122,7 @@ pub struct SweptResult {
     /// Verdict on the highest ridge. [`Verdict::Unknown`]: the error bound is above [`super::ERROR_SHARE_MAX`] of the limit, or there are
     /// fewer than two whole passes.
     pub scallop_verdict: Verdict,
-    /// Verdict on gouges: deeper than the tolerance of the part whose face this is, or any where there is none. [`Verdict::Unknown`]: the bound of the search is above [`super::ERROR_SHARE_MAX`] of the scallop limit.
+    /// Verdict on gouges: deeper by more than the error bound than the tolerance of the part whose face this is, or than 0 where there is none. [`Verdict::Unknown`]: the bound of the search is above [`super::ERROR_SHARE_MAX`] of the scallop limit.
     pub gouge_verdict: Verdict,
     /// Mean of the crest's height, weighted by the surface's area (each gap's strip counts with its crest's height), mm.
     pub scallop_mean_mm: f64,
@@ -132,7 +134,7 @@ pub struct SweptResult {
     pub measurement_error: MeasurementError,
     /// The deepest gouge; `None` if none is deeper than `gouge_floor_mm`.
     pub gouge: Option<Gouge>,
-    /// Least depth that counts as a gouge, mm: the position tolerance of `verify`, plus the interpolation error between samples.
+    /// Error bound of a gouge's depth, and least depth that counts as one, mm: the position tolerance of `verify`, plus the interpolation error between samples.
     pub gouge_floor_mm: f64,
     /// Upper bound of the depth at every point of the surface, mm; near contacts it assumes that the contacts are correct.
     pub gouge_bound_mm: f64,
@@ -170,7 +172,7 @@ pub(super) struct Measurements<'a> {
 impl SweptResult {
     pub(super) fn new(job: &Job, oracle: &Oracle, track: &ToolPath, parts: &Measurements<'_>) -> Self {
         let deviation_mm = parts.deviation_mm.iter().copied().fold(0.0, f64::max);
-        let (scallop_max, own_error_mm, [most_at_stations, most_possible]) = extreme(oracle, parts);
+        let (mut scallop_max, [most_at_stations, most_possible]) = extreme(oracle, parts);
         let (scallop_mean_mm, scallop_histogram) = mean(oracle, parts);
         let sensitivity = sensitivity(scallop_max.height_mm, oracle.radius_mm);
         let coordinates = parts.axes.extent_mm.map_or(0.0, |extent| {
@@ -185,6 +187,7 @@ impl SweptResult {
             stations_mm: most_at_stations - scallop_max.height_mm,
             search_mm: CREST_MM + ARITHMETIC * (coordinates + oracle.radius_mm) * sensitivity,
         };
+        scallop_max.error_mm += measurement_error.rounding_mm + measurement_error.search_mm;
         let mut findings = Self {
             scallop_max,
             scallop_verdict: Verdict::Unknown,
@@ -207,10 +210,8 @@ impl SweptResult {
         };
         let by_original_mm = parts.original.map_or(0.0, |original| original.tolerance_mm);
         let limit_mm = job.scallop_mm * (1.0 + parts.requirements.scallop_tolerance) + by_original_mm;
-        // Between stations a ridge can only be higher, so this error is that of the highest crest itself.
-        let own_error_mm = own_error_mm + measurement_error.rounding_mm + measurement_error.search_mm;
         let over_surface_mm = parts.original.map_or(0.0, |original| original.over_surface_mm);
-        let surely_above = findings.scallop_max.height_mm - own_error_mm > limit_mm
+        let surely_above = findings.scallop_max.height_mm - findings.scallop_max.error_mm > limit_mm
             || over_surface_mm - findings.measurement_error_mm > limit_mm - by_original_mm;
         findings.scallop_verdict = findings.judge_scallop(job, limit_mm, surely_above);
         findings.gouge_verdict = findings.judge_gouge(job);
@@ -262,9 +263,14 @@ impl SweptResult {
     fn judge_gouge(&self, job: &Job) -> Verdict {
         if !self.has_samples() {
             Verdict::Unknown
-        } else if self.gouge_max_mm() > gouge_allowed_mm(job) {
+        } else if self.gouge_max_mm() > gouge_allowed_mm(job) + self.gouge_floor_mm {
             Verdict::Violated
-        } else if self.gouge_bound_mm.max(self.gouge_floor_mm) <= self.gouge_seen_mm(job) {
+        } else if self.gouge_floor_mm <= self.gouge_seen_mm(job)
+            && self.gouge_bound_mm
+                <= self
+                    .gouge_seen_mm(job)
+                    .max(gouge_allowed_mm(job) + self.gouge_floor_mm)
+        {
             Verdict::Met
         } else {
             Verdict::Unknown
@@ -297,14 +303,14 @@ impl SweptResult {
                  (measured within {:.1e} mm)",
                 most.height_mm,
                 self.original.map_or(0.0, |original| original.over_surface_mm),
-                self.measurement_error_mm
+                most.error_mm
             )),
             Verdict::Violated => Some(format!(
                 "the scallop is {:.6} mm high, {:.2} % above the limit of {limit} mm, {place} (measured within {:.1e} mm): ask for scallop_mm = {:.3e}, or \
                  accept it with --scallop-tolerance {:.2}%",
                 most.height_mm,
                 100.0 * (most.height_mm / limit - 1.0),
-                self.measurement_error_mm,
+                most.error_mm,
                 ASKED_SHARE * limit * limit / most.height_mm,
                 100.0 * ((most.height_mm / limit - 1.0).max(0.0) + ACCEPTED_MARGIN)
             )),
@@ -353,9 +359,10 @@ impl SweptResult {
                 "the ball's contact is on another part of the surface"
             };
             failures.push(format!(
-                "the ball cuts {:.6} mm below the surface at u = {:.6}, v = {:.6} (x = {:.3}, y = {:.3}, z = {:.3} mm): at tick {}, pass {}, \
-                 with its contact at u = {:.6}, v = {:.6}; {what}: take a smaller ball, or exclude this region",
+                "the ball cuts {:.6} mm below the surface (measured within {:.1e} mm) at u = {:.6}, v = {:.6} (x = {:.3}, y = {:.3}, z = {:.3} mm): \
+                 at tick {}, pass {}, with its contact at u = {:.6}, v = {:.6}; {what}: take a smaller ball, or exclude this region",
                 gouge.depth_mm,
+                self.gouge_floor_mm,
                 gouge.u,
                 gouge.v,
                 gouge.point_mm[0],
@@ -416,9 +423,9 @@ fn sensitivity(height_mm: f64, radius_mm: f64) -> f64 {
     1.0 / (1.0 - 2.0 * height_mm / radius_mm).max(0.1)
 }
 
-/// The highest crest; its error by the deviation of the path's chords, mm; and the upper bounds of a crest, mm: between stations, and with
+/// The highest crest, with its error by the deviation of the path's chords; and the upper bounds of a crest, mm: between stations, and with
 /// that deviation.
-fn extreme(oracle: &Oracle, parts: &Measurements<'_>) -> (HighestScallop, f64, [f64; 2]) {
+fn extreme(oracle: &Oracle, parts: &Measurements<'_>) -> (HighestScallop, [f64; 2]) {
     let mut most: Option<(f64, &Crest, usize)> = None;
     let (mut possible, mut own_error_mm) = ([0.0_f64; 2], 0.0);
     let path_mm = parts.deviation_mm.iter().copied().fold(0.0, f64::max);
@@ -447,7 +454,7 @@ fn extreme(oracle: &Oracle, parts: &Measurements<'_>) -> (HighestScallop, f64, [
         possible = [possible[0].max(between), possible[1].max(all)];
     }
     let Some((height_mm, crest, index)) = most else {
-        return (HighestScallop::default(), 0.0, [0.0; 2]);
+        return (HighestScallop::default(), [0.0; 2]);
     };
     let (u, v) = oracle.swapped(crest.path, parts.gaps[index].side(crest.path, crest.share));
     let extreme = HighestScallop {
@@ -456,8 +463,9 @@ fn extreme(oracle: &Oracle, parts: &Measurements<'_>) -> (HighestScallop, f64, [
         v,
         passes: parts.gaps[index].indices.map(number),
         point_mm: crest.point_mm,
+        error_mm: own_error_mm,
     };
-    (extreme, own_error_mm, possible)
+    (extreme, possible)
 }
 
 #[allow(clippy::cast_possible_truncation, reason = "passes are 32 bits")]

@@ -103,10 +103,13 @@ impl Bend {
                     parabolas()
                 }
             }
-            // The bend of a chord alone is unknown: a standing or reversing tool has none.
+            // The bend of a chord alone is that of its left-out samples: a standing or reversing tool has none.
             (None, None) => 0.0,
             _ => PARABOLA * bend.deviation_mm,
         };
+        // What the left-out samples bend more than the curve.
+        let missing_mm = pass.left_out_mm(k) - bend.deviation_mm - ROUNDING_MM;
+        bend.uncertainty_mm = bend.uncertainty_mm.max(missing_mm);
         Some(bend)
     }
 
@@ -197,6 +200,7 @@ fn refined(pass: &ToolPathPass, tolerance_mm: f64) -> (Option<ToolPathPass>, f64
                 periods: pass.periods[..k].to_vec(),
                 path: pass.path[..k].to_vec(),
                 cl_nm: pass.cl_nm[..k].to_vec(),
+                left_out_nm: Vec::new(),
                 sides: pass.sides.iter().take(k).copied().collect(),
                 side: pass.side,
                 first_tick: pass.first_tick,

@@ -1,15 +1,17 @@
-//! The tool path of a run in compact form: 24 bytes per sample.
+//! The tool path of a run in compact form: 28 bytes per sample.
 
 use super::CHORD_SHARE;
 use glam::DVec3;
-use job::Along;
 use job::units::{MM_PER_NM, NM_PER_MM};
+use job::{Along, Job};
 use oracle::PassSample;
 
-/// A sample farther than this share of the scallop limit from the line through the stored samples is stored: twice the deviation that chords have anyway.
-const BEND_SHARE: f64 = 2.0 * CHORD_SHARE;
-/// Least deviation from the line at which a sample is stored, nm: rounding of the centres bends a straight line by less.
+/// Least deviation from a chord at which samples are stored, nm: rounding of the centres bends a straight line by less.
 const BEND_MIN_NM: f64 = 4.0;
+/// Largest number of samples left out in a row: each is held against the chord that takes their place.
+const LEFT_OUT_MAX: usize = 64;
+/// Least distance of stored samples on straight parts, as a share of the largest step between two samples.
+const SPACING_SHARE: f64 = 0.5;
 
 /// One pass as emitted.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -26,6 +28,8 @@ pub struct ToolPathPass {
     pub path: Vec<f64>,
     /// Ball centre of each sample, nm.
     pub cl_nm: Vec<[i32; 3]>,
+    /// Largest distance of the samples left out before each sample from the chord to it, nm; may be shorter, 0 beyond its end.
+    pub left_out_nm: Vec<f32>,
 }
 
 impl ToolPathPass {
@@ -62,12 +66,22 @@ impl ToolPathPass {
         Some([first.min(last), first.max(last)])
     }
 
-    fn push(&mut self, tick: u64, path: f64, side: f64, cl_nm: [i32; 3]) {
-        self.periods
-            .push(u32::try_from(tick.saturating_sub(self.first_tick)).unwrap_or(u32::MAX));
-        self.path.push(path);
-        self.cl_nm.push(cl_nm);
-        self.add_side(side);
+    /// Adds a sample; `left_out_nm`: largest distance of those left out before it from the chord to it.
+    fn push(&mut self, sample: &LeftOut, left_out_nm: f64) {
+        let periods = sample.tick.saturating_sub(self.first_tick);
+        self.periods.push(u32::try_from(periods).unwrap_or(u32::MAX));
+        self.path.push(sample.path);
+        self.cl_nm.push(sample.cl_nm);
+        self.left_out_nm.resize(self.cl_nm.len() - 1, 0.0);
+        #[allow(clippy::cast_possible_truncation, reason = "a bound of a few digits")]
+        self.left_out_nm.push(left_out_nm as f32);
+        self.add_side(sample.side);
+    }
+
+    /// Largest distance of the samples left out between a sample and the next one from the chord between them, mm.
+    pub(super) fn left_out_mm(&self, index: usize) -> f64 {
+        let left_out_nm = self.left_out_nm.get(index + 1).copied().unwrap_or(0.0);
+        f64::from(left_out_nm) * MM_PER_NM
     }
 
     /// Adds the side parameter of the sample that was added last.
@@ -129,26 +143,13 @@ impl ToolPathPass {
     }
 }
 
-/// A sample that is not stored.
+/// A sample that is not stored, or not yet.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct LeftOut {
     tick: u64,
     path: f64,
     side: f64,
     cl_nm: [i32; 3],
-    /// Its distance from the last stored one.
-    apart_nm: f64,
-}
-
-/// Where a sample is with respect to those stored.
-#[derive(Clone, Copy)]
-enum Placement {
-    /// Nearer to the last one than the minimum distance, nm, in the direction in which that was reached.
-    Near(f64),
-    /// Farther in that direction.
-    Far,
-    /// In another direction.
-    Beside,
 }
 
 /// The tool path of a run: written sample by sample, then read.
@@ -159,10 +160,10 @@ pub struct ToolPath {
     /// Minimum distance of stored samples, nm: nearer ones are left out where the path is straight, except the last of a pass. At low
     /// feed the samples are denser than needed.
     spacing_nm: f64,
-    /// Greatest distance from the straight line of one left out, nm.
+    /// Greatest distance of a sample left out from the chord that takes its place, nm.
     bend_nm: f64,
-    /// The sample before, if it is not stored.
-    left_out: Option<LeftOut>,
+    /// The samples since the last stored one.
+    left_out: Vec<LeftOut>,
     /// The last centre of a turn, and the boundary there: it belongs to the pass that follows.
     lead_in: Option<([i32; 3], f64)>,
     /// The first centre of a turn, likewise: it belongs to the pass before.
@@ -170,90 +171,99 @@ pub struct ToolPath {
 }
 
 impl ToolPath {
+    /// An empty path for measuring a job. Without limits it keeps every sample. With limits the feed is low at the ends of passes, and where an axis is slow: on straight
+    /// parts it leaves out samples closer than half the step at the feed, or at the largest speed of the axes where that is less.
+    #[must_use]
+    pub fn of_job(job: &Job) -> Self {
+        let spacing_mm = job.machine.limits.map_or(0.0, |limits| {
+            let axes_mm_s = DVec3::from(limits.velocity_mm_s).length();
+            SPACING_SHARE * job.feed_mm_s().min(axes_mm_s) * job.machine.period_s()
+        });
+        Self::with_spacing(spacing_mm * NM_PER_MM, job.scallop_mm)
+    }
+
     /// An empty path with this minimum distance of samples on straight parts, nm, for measuring scallops of this height.
     #[must_use]
     pub fn with_spacing(spacing_nm: f64, scallop_mm: f64) -> Self {
         Self {
             spacing_nm,
-            bend_nm: (BEND_SHARE * scallop_mm * NM_PER_MM).max(BEND_MIN_NM),
+            bend_nm: (CHORD_SHARE * scallop_mm * NM_PER_MM).max(BEND_MIN_NM),
             ..Self::default()
         }
     }
 
-    /// Where a sample is with respect to those stored.
-    fn placement(&self, sample: &PassSample) -> Placement {
-        let Some(pass) = self.passes.last().filter(|_| !sample.first_of_pass) else {
-            return Placement::Far;
-        };
-        let Some(last) = pass.cl_nm.len().checked_sub(1) else {
-            return Placement::Far;
-        };
-        let stored = |index: usize| DVec3::from(pass.cl_nm[index].map(f64::from));
-        let by = DVec3::from(sample.cl_nm.map(f64::from)) - stored(last);
-        let apart = by.length();
-        let recedes = self.left_out.is_none_or(|left_out| apart >= left_out.apart_nm);
-        let direction = last.checked_sub(1).map_or(DVec3::ZERO, |before| {
-            (stored(last) - stored(before)).normalize_or_zero()
-        });
-        let is_straight = direction == DVec3::ZERO || by.distance(direction * apart) <= self.bend_nm;
-        if !is_straight || !recedes {
-            Placement::Beside
-        } else if apart < self.spacing_nm {
-            Placement::Near(apart)
-        } else {
-            Placement::Far
-        }
-    }
-
-    /// Adds the next sample. Returns whether it was stored: it is not where it is near the last one on a straight part. The one left out before may be stored with it.
+    /// Adds the next sample. Returns whether it was stored: it is not where it is near the last one on a straight part. The one left out before may be stored with it, or instead of it.
     pub fn add(&mut self, sample: &PassSample, along: Along) -> bool {
         let (path, side) = match along {
             Along::U => (sample.u, sample.v),
             Along::V => (sample.v, sample.u),
         };
         if sample.first_of_pass || self.passes.is_empty() {
-            // Neighbouring passes have similar lengths.
-            let room = self
-                .passes
-                .last()
-                .map_or(0, |pass| pass.path.len() + pass.path.len() / 64);
-            self.passes.push(ToolPathPass {
-                side,
-                sides: Vec::new(),
-                first_tick: sample.tick,
-                periods: Vec::with_capacity(room),
-                path: Vec::with_capacity(room),
-                cl_nm: Vec::with_capacity(room),
-            });
-            if let Some((cl_nm, boundary)) = self.lead_in.take() {
-                self.push_turn(cl_nm, boundary);
-            }
+            self.begin_pass(side, sample.tick);
         }
-        let placement = self.placement(sample);
-        if let (Placement::Near(apart_nm), false) = (placement, sample.last_of_pass) {
-            self.left_out = Some(LeftOut {
-                tick: sample.tick,
-                path,
-                side,
-                cl_nm: sample.cl_nm,
-                apart_nm,
-            });
+        let here = LeftOut {
+            tick: sample.tick,
+            path,
+            side,
+            cl_nm: sample.cl_nm,
+        };
+        let Some(pass) = self.passes.last_mut() else {
+            return false;
+        };
+        let mut bend_nm = off_chord_nm(pass, &self.left_out, here.cl_nm);
+        if bend_nm > self.bend_nm
+            && let Some((before, others)) = self.left_out.split_last()
+        {
+            // The path is straight up to the sample before.
+            pass.push(before, off_chord_nm(pass, others, before.cl_nm));
+            self.left_out.clear();
+            bend_nm = 0.0;
+        }
+        let is_near = pass.cl_nm.last().is_some_and(|last| {
+            !sample.first_of_pass && place(*last).distance(place(here.cl_nm)) < self.spacing_nm
+        });
+        if is_near && self.left_out.len() < LEFT_OUT_MAX && !sample.last_of_pass {
+            // A standing tool takes one place, however long.
+            if self
+                .left_out
+                .last()
+                .is_some_and(|before| before.cl_nm == here.cl_nm)
+            {
+                self.left_out.pop();
+            }
+            self.left_out.push(here);
             return false;
         }
-        let left_out = self.left_out.take();
-        if let Some(pass) = self.passes.last_mut() {
-            // The path is straight up to the sample before.
-            if let (Placement::Beside, Some(before)) = (placement, left_out) {
-                pass.push(before.tick, before.path, before.side, before.cl_nm);
-            }
-            pass.push(sample.tick, path, side, sample.cl_nm);
-        }
+        pass.push(&here, bend_nm);
+        self.left_out.clear();
         if sample.last_of_pass
             && let Some((cl_nm, boundary)) = self.lead_out.take()
         {
             self.push_turn(cl_nm, boundary);
         }
         true
+    }
+
+    /// Begins a pass.
+    fn begin_pass(&mut self, side: f64, first_tick: u64) {
+        self.left_out.clear();
+        // Neighbouring passes have similar lengths.
+        let room = self
+            .passes
+            .last()
+            .map_or(0, |pass| pass.path.len() + pass.path.len() / 64);
+        self.passes.push(ToolPathPass {
+            side,
+            sides: Vec::new(),
+            first_tick,
+            periods: Vec::with_capacity(room),
+            path: Vec::with_capacity(room),
+            cl_nm: Vec::with_capacity(room),
+            left_out_nm: Vec::with_capacity(room),
+        });
+        if let Some((cl_nm, boundary)) = self.lead_in.take() {
+            self.push_turn(cl_nm, boundary);
+        }
     }
 
     /// Adds a centre of a turn next to the pass that it leaves, as its end at the boundary.
@@ -306,6 +316,25 @@ impl ToolPath {
         }
         extent.map(|extent| extent.map(|range| range.map(|nm| f64::from(nm) * MM_PER_NM)))
     }
+}
+
+/// A centre, nm.
+fn place(cl_nm: [i32; 3]) -> DVec3 {
+    DVec3::from(cl_nm.map(f64::from))
+}
+
+/// Largest distance of samples from the chord from the last one of a pass to a centre, nm.
+fn off_chord_nm(pass: &ToolPathPass, samples: &[LeftOut], to_nm: [i32; 3]) -> f64 {
+    let Some(from) = pass.cl_nm.last().map(|last| place(*last)) else {
+        return 0.0;
+    };
+    let way = place(to_nm) - from;
+    let squared = way.length_squared().max(f64::MIN_POSITIVE);
+    let off = |sample: &LeftOut| {
+        let at = place(sample.cl_nm) - from;
+        at.distance_squared(way * (at.dot(way) / squared).clamp(0.0, 1.0))
+    };
+    samples.iter().map(off).fold(0.0, f64::max).sqrt()
 }
 
 /// The component of a vector normal to a unit direction.
