@@ -128,7 +128,10 @@ fn a_part_without_a_job_tells_why() {
         assert!(face["job"].is_null() && face["error"].is_string(), "{face}");
     }
     for (options, words) in [
-        ("--tool 3", "no face of hood.step has a job: face 1:"),
+        (
+            "--tool 3",
+            "no face of hood.step has a job: face 1 (#39, B-spline): its degree is 5",
+        ),
         ("--tool nan", "--tool must be above 0 and at most 1000, not NaN"),
         (
             "--tool 1 --scallop-mm 1",

@@ -61,6 +61,14 @@ fn span(span: &SpeedRange) -> Value {
     json!({ "min": span.min, "mean": span.mean(), "max": span.max })
 }
 
+/// As text; without a sample after a fault in the first pass.
+fn span_text(span: &SpeedRange) -> String {
+    if !span.min.is_finite() {
+        return "not measured".to_owned();
+    }
+    format!("{:.3} to {:.3} mm/s, mean {:.3}", span.min, span.max, span.mean())
+}
+
 impl Outcome<'_> {
     fn machining_time_s(&self) -> f64 {
         self.job.machine.time_s(self.findings.samples)
@@ -145,12 +153,7 @@ impl Outcome<'_> {
             ("CC", format!(", programmed {feed:.3}"), &speeds.cc),
             ("CL", String::new(), &speeds.cl),
         ] {
-            say!(
-                "  {name} speed     {:.3} to {:.3} mm/s, mean {:.3}{of}",
-                span.min,
-                span.max,
-                span.mean()
-            );
+            say!("  {name} speed     {}{of}", span_text(span));
         }
         say!(
             "  CL jumps     {:.3} mm/s at most between {parts}, {:.3} between periods",
@@ -158,7 +161,9 @@ impl Outcome<'_> {
             speeds.cl_change_mm_s
         );
         say!("  CL error     {:.3} um at most", report.position_nm.max * 1e-3);
-        say!("  interval     {:.7} at least", findings.interval_min);
+        if findings.interval_min.is_finite() {
+            say!("  interval     {:.7} at least", findings.interval_min);
+        }
         say!(
             "  feed ripple  {:.6} % at most, {:.6} % rms",
             report.ripple_pct.max.abs(),
@@ -172,5 +177,15 @@ impl Outcome<'_> {
         if let Some(page) = page {
             say!("  report       {}", page.display());
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_speed_without_samples_is_not_measured() {
+        assert_eq!(span_text(&SpeedRange::default()), "not measured");
     }
 }

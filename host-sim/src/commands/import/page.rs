@@ -102,8 +102,11 @@ fn face(file: &str, row: &Row<'_>, quads: usize) -> Value {
 /// The page of these faces.
 pub(super) fn page(file: &str, rows: &[Row<'_>]) -> String {
     let quads = QUADS[usize::from(rows.len() > MANY)];
-    let data =
-        json!({ "file": file, "faces": rows.iter().map(|row| face(file, row, quads)).collect::<Vec<_>>() });
+    let data = json!({
+        "file": file, "faces": rows.iter().map(|row| face(file, row, quads)).collect::<Vec<_>>(),
+        // Areas of trimmed faces are not theirs.
+        "rectangles": rows.iter().any(|row| row.boundary() != "no"),
+    });
     // No text of the file ends the script.
     PAGE.replace("@DATA@", &data.to_string().replace('<', "\\u003c"))
 }

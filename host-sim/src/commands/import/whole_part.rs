@@ -244,10 +244,25 @@ pub(super) fn reaches(
         .collect()
 }
 
+/// In the sentence on a face without a fit within the tolerance.
+const WITHOUT_FIT: &str = "no fit within";
+
+/// Why a face is refused: many sentences name it themselves.
+fn of_face(number: usize, why: &str) -> String {
+    let name = format!("face {number}");
+    match why
+        .strip_prefix(&name)
+        .is_some_and(|rest| rest.starts_with([' ', ':']))
+    {
+        true => why.to_owned(),
+        false => format!("{name}: {why}"),
+    }
+}
+
 /// Why no face has a job.
 fn without_jobs(arguments: &Arguments, file: &str, radius_mm: f64, plans: &[FacePlan]) -> Failure {
     let refused: Vec<String> = (plans.iter())
-        .filter_map(|plan| Some(format!("face {}: {}", plan.number, plan.refused.as_ref()?)))
+        .filter_map(|plan| Some(of_face(plan.number, &plan.refused.as_ref()?.to_string())))
         .collect();
     if refused.is_empty() {
         return Failure::input(
@@ -268,8 +283,26 @@ fn without_jobs(arguments: &Arguments, file: &str, radius_mm: f64, plans: &[Face
             refused[..refused.len().min(CAUSES)].join("; ")
         ),
         match refused.len() == plans.len() {
+            true if refused.iter().any(|why| why.contains(WITHOUT_FIT)) => {
+                "give a larger --tolerance, mend the faces in the CAD system, or see what import --face N says of each"
+            }
             true => "mend the faces in the CAD system, or see what import --face N says of each",
             false => "take a smaller ball for the others, or another side up with --up auto",
         },
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_refusal_names_its_face_once() {
+        assert_eq!(
+            of_face(1, "face 1 (#17, plane): flat"),
+            "face 1 (#17, plane): flat"
+        );
+        assert_eq!(of_face(1, "face 12 is hidden"), "face 1: face 12 is hidden");
+        assert_eq!(of_face(2, "it is a point"), "face 2: it is a point");
+    }
 }

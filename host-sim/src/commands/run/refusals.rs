@@ -70,6 +70,12 @@ impl From<QemuError> for Failure {
 
 impl From<ChipError> for Failure {
     fn from(error: ChipError) -> Self {
-        Self::Failed(Some(error.to_string()))
+        let remedy = match error {
+            ChipError::Build(..) => {
+                "\n  help: run it in a checkout of the sources, where the image can be built, or run the job with `simulate`"
+            }
+            ChipError::Start(_) => "",
+        };
+        Self::Failed(Some(format!("{error}{remedy}")))
     }
 }
