@@ -172,19 +172,63 @@ fn campaign_of_limits() {
         campaign(0..runs, are_equal, &STRAIGHT);
         campaign(0..runs, are_equal, &CURVED);
     }
-    // As `verify` measures it.
-    for degrees in [0.5, 20.0] {
-        println!(
-            "lines that bend by {degrees} degrees: {:?}",
-            used(&bent_lines(degrees)).shares
+}
+
+/// What a run uses of accelerations and jerks, as `verify` measures it, is within what it permits.
+fn holds(job: &Job, what: &str) {
+    let [_, acceleration, jerk] = used(job).shares;
+    println!("{what}: acceleration {acceleration:.3}, jerk {jerk:.3}");
+    assert!(
+        acceleration <= PERMITTED[1] && jerk <= PERMITTED[2],
+        "{what}: acceleration {acceleration}, jerk {jerk}"
+    );
+}
+
+#[test]
+fn lines_that_bend_at_a_knot() {
+    for degrees in [0.01, 0.05, 0.2, 0.5, 1.0, 5.0, 20.0] {
+        holds(
+            &bent_lines(degrees),
+            &format!("lines that bend by {degrees} degrees"),
         );
     }
-    for (radius_mm, feed_mm_min) in [(0.3, 1200.0), (0.5, 6000.0), (0.8, 6000.0)] {
-        println!(
-            "circles of {radius_mm} mm: {:?}",
-            used(&ring(radius_mm, feed_mm_min)).shares
+}
+
+#[test]
+fn circles_of_tenths_of_a_millimetre() {
+    for (radius_mm, feed_mm_min) in [(0.15, 600.0), (0.3, 1200.0), (0.5, 6000.0), (0.8, 6000.0)] {
+        holds(
+            &ring(radius_mm, feed_mm_min),
+            &format!("circles of {radius_mm} mm"),
         );
     }
+}
+
+/// The next pass begins where the last one is on a boundary with two knots at which its curvature jumps: along it a step-over crept at 0.01 mm/s, for minutes.
+#[test]
+fn no_link_creeps() {
+    let mut job = random_case(17, true).unwrap();
+    job.spacing = CURVED[1];
+    let prepared = prepare(&job).unwrap();
+    let mut core = loaded(&prepared.header, &prepared.words);
+    let mut sample = period(&mut core, Command::Start);
+    let (mut linking, mut longest) = (0, 0);
+    while sample.state.is_under_way() {
+        linking = if sample.state == State::Linking {
+            linking + 1
+        } else {
+            0
+        };
+        longest = longest.max(linking);
+        assert!(
+            longest < 5000,
+            "a link of pass {} takes more than 5 s",
+            sample.pass
+        );
+        sample = period(&mut core, None);
+    }
+    assert_eq!(sample.state, State::Finished);
+    println!("the longest link takes {longest} ms");
 }
 
 /// Lines of a plane that bend at a knot, by about this angle: the tangent plane is continuous, the direction of the passes is not.

@@ -138,18 +138,15 @@ impl Follower {
         true
     }
 
-    /// The tool is known to be ahead by this arc, units of 2^-10 nm: the plan goes on from there. Returns whether it does: not where the walk nearly
-    /// stands.
-    pub(crate) fn correct(&mut self, plan: &Plan, apart_q10: i64) -> bool {
-        let mm = if apart_q10 < 0 {
-            -to_mm(-apart_q10)
-        } else {
-            to_mm(apart_q10)
-        };
-        let is_done = self.shift(mm, plan);
-        if is_done {
-            self.arc_q10 += apart_q10;
+    /// The tool is known to be ahead by this arc, units of 2^-10 nm: the plan goes on from there, or from the part of it that is small against an interval. Returns
+    /// that part.
+    pub(crate) fn correct(&mut self, plan: &Plan, apart_q10: i64) -> i64 {
+        let most_q10 = i64::from(super::plan::step_q10(self.cursor.shift_max(plan)));
+        let part_q10 = apart_q10.min(most_q10).max(-most_q10);
+        if !self.shift(to_mm(part_q10), plan) {
+            return 0;
         }
-        is_done
+        self.arc_q10 += part_q10;
+        part_q10
     }
 }

@@ -30,17 +30,18 @@ pub(crate) struct Station {
 pub(crate) struct Stations {
     list: [Station; STATIONS_MAX],
     count: u16,
-    /// Cells between the stations of a patch, over whose [`parts_of_cell`] derivatives were taken, and patches of which the outer stations are kept; no cells where derivatives were
-    /// taken over others.
-    cells: u16,
+    /// Length of a cell that the derivatives of each station were taken over, 2^-7 mm, rounded down; the greatest where they are exact.
+    spacing: [u8; STATIONS_MAX],
+    /// Patches of which the outer stations are kept.
     group: u16,
-    /// Least length of those others, mm.
-    spacing: f32,
 }
+
+/// Parts of a millimetre that a spacing is kept in.
+const SPACING_PARTS: f32 = 128.0;
 
 /// Error of a derivative by differences of positions rounded to a nanometre, times the cell's length to its power: three standard deviations
 /// at the end of a window.
-const FIRST_NOISE: f32 = 2e-6;
+pub(crate) const FIRST_NOISE: f32 = 2e-6;
 const SECOND_NOISE: f32 = 12e-6;
 
 /// Least length of a cell, mm: a shorter one has differences of rounded positions.
@@ -81,25 +82,26 @@ impl Stations {
     pub(crate) const NONE: Self = Self {
         list: [Station::NONE; STATIONS_MAX],
         count: 0,
-        cells: 0,
+        spacing: [u8::MAX; STATIONS_MAX],
         group: 1,
-        spacing: 0.0,
     };
 
     pub(crate) const fn clear(&mut self) {
         self.count = 0;
-        self.cells = 0;
-        self.spacing = f32::MAX;
+        self.group = 1;
     }
 
-    /// Derivatives are taken over the [`parts_of_cell`]: `cells` in each patch; of `group` patches the outer stations are kept.
-    pub(crate) const fn note_cells(&mut self, cells: u16, group: u16) {
-        (self.cells, self.group) = (cells, group);
+    /// Of this many patches the outer stations are kept.
+    pub(crate) const fn note_group(&mut self, patches: u16) {
+        self.group = patches;
     }
 
-    /// Derivatives are taken over cells of this length, mm, which are no parts of those between stations.
-    pub(crate) fn note_spacing(&mut self, mm: f32) {
-        self.spacing = self.spacing.at_most(mm);
+    /// Derivatives of a station, by its number from the end of the list, were taken over cells of this length, mm.
+    pub(crate) fn note_spacing(&mut self, back: u16, mm: f32) {
+        let index = usize::from(self.count.saturating_sub(back));
+        if let Some(place) = self.spacing.get_mut(index) {
+            *place = u8::try_from(truncated(mm * SPACING_PARTS)).unwrap_or(u8::MAX);
+        }
     }
 
     /// Appends a station; ignored where the list is full.
@@ -107,6 +109,7 @@ impl Stations {
         if let Some(place) = self.list.get_mut(usize::from(self.count)) {
             *place = station;
             self.count += 1;
+            self.note_spacing(1, f32::MAX);
         }
     }
 
@@ -151,19 +154,18 @@ impl Stations {
         station + 1 < self.count && self.get(station).arc_nm == self.get(station + 1).arc_nm
     }
 
-    /// Length of what derivatives were taken over in a cell, mm.
-    fn spacing_in(&self, cell: u16) -> f32 {
-        if self.cells == 0 {
-            return self.spacing;
+    /// Length of the cells that the derivatives of a station were taken over, mm.
+    fn spacing_at(&self, station: u16) -> f32 {
+        match self.spacing.get(usize::from(station)) {
+            Some(parts) if *parts < u8::MAX => f32::from(*parts) * (1.0 / SPACING_PARTS),
+            _ => f32::MAX,
         }
-        let length = self.cell_mm(cell) / f32::from(self.group);
-        length / f32::from(parts_of_cell(length * f32::from(self.cells), self.cells))
     }
 
     /// The jump at a station, less what rounding can make of it in the cells beside it.
     pub(crate) fn jump(&self, station: u16) -> Jump {
-        let before = self.spacing_in(station.saturating_sub(1));
-        let inverse = 1.0 / before.at_most(self.spacing_in(station + 1)).at_least(1e-3);
+        let least = self.spacing_at(station).at_most(self.spacing_at(station + 1));
+        let inverse = 1.0 / least.at_least(1e-3);
         let noise = [FIRST_NOISE * inverse, SECOND_NOISE * inverse * inverse];
         let mut jump = [[0.0; 2]; 3];
         let sides = self.get(station).q.iter().zip(&self.get(station + 1).q);
@@ -222,7 +224,7 @@ impl Stations {
 
     /// Whether a station stands for a group of patches, with their greatest derivatives.
     const fn is_of_groups(&self) -> bool {
-        self.cells > 0 && self.group > 1
+        self.group > 1
     }
 }
 

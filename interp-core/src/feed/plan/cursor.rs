@@ -85,14 +85,35 @@ impl Cursor {
 
     /// Moves by this arc, mm, small against an interval; not where the walk nearly stands, and would have to go far. Returns whether it moved.
     pub(crate) fn shift(&mut self, mm: f32, plan: &Plan) -> bool {
-        let [slope, _, _] = plan.interval(self.interval).walk_rates(self.x);
-        let by = mm / slope.at_least(1e-9);
+        let by = mm / self.slope(plan);
         let is_small = by.abs() < SHIFT_MAX;
         if is_small {
-            self.x = (self.x + by).at_least(0.0);
+            self.x += by;
             self.carry(plan);
+            self.borrow(plan);
         }
         is_small
+    }
+
+    /// The longest arc, mm, that it may be moved by.
+    pub(crate) fn shift_max(&self, plan: &Plan) -> f32 {
+        0.5 * SHIFT_MAX * self.slope(plan)
+    }
+
+    /// Arc of an interval at the slope here, mm.
+    fn slope(&self, plan: &Plan) -> f32 {
+        let [slope, _, _] = plan.interval(self.interval).walk_rates(self.x);
+        slope.at_least(1e-9)
+    }
+
+    /// Into the interval before where the fraction is below 0; at the start of the path to that.
+    fn borrow(&mut self, plan: &Plan) {
+        if self.x < 0.0 && self.interval > 0 {
+            self.interval -= 1;
+            self.start_q10 -= plan.interval_q10(self.interval);
+            self.x += 1.0;
+        }
+        self.x = self.x.at_least(0.0);
     }
 
     /// Into the next interval where the fraction is above 1.

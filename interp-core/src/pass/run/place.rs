@@ -4,6 +4,9 @@ use super::Run;
 use crate::math::arith::{fraction_to_f32, truncated};
 use crate::sample::SpanParameter;
 
+/// Last part of a patch, 2^-64, whose arc two points give: the speed may be many times that in its middle.
+const LAST_PART: u64 = 1 << 61;
+
 impl Run {
     /// Pass, path and side parameter of the tool, in the surface's own direction.
     pub(crate) const fn surface_position(&self) -> (u32, SpanParameter, SpanParameter) {
@@ -59,13 +62,18 @@ impl Run {
         Some(length * mean / (travel.path.inv_speed * self.buffer.patch().per_mm))
     }
 
-    /// Arc to the end of the pass, mm, by Hermite's two-point rule; none before its last piece, and where its end is not evaluated.
+    /// Arc to the end of the pass, mm, by Hermite's two-point rule; none before the last part of its last piece, and where
+    /// its end is not evaluated.
     pub(crate) fn arc_left(&self) -> Option<f32> {
         let (travel, patch) = (&self.travel, self.buffer.patch());
         if !self.is_along() || !patch.has_end() || !self.buffer.is_last() {
             return None;
         }
-        let length = fraction_to_f32(travel.piece.end().checked_sub(travel.fraction)?);
+        let left = travel.piece.end().checked_sub(travel.fraction)?;
+        if left > LAST_PART {
+            return None;
+        }
+        let length = fraction_to_f32(left);
         let (here, end) = (&travel.path, patch.end());
         let (first, last) = (1.0 / here.inv_speed, 1.0 / end.inv_speed);
         let bow = first * here.log_speed_derivative - last * end.log_speed_derivative;

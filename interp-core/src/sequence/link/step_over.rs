@@ -30,6 +30,9 @@ const V_TIMES_A: f32 = 0.456;
 /// Share of the jerk that a jump of the direction may take in the periods that see it.
 const JUMP_JERK_SHARE: f32 = 0.1;
 
+/// Time of a step-over at the speed at which it passes jumps of the direction from which on a lift is shorter, s.
+const LIFT_S: f32 = 1.0;
+
 /// Rounds in which the speed of a step-over and what its bends leave are adapted to each other.
 const ROUNDS: u8 = 3;
 
@@ -386,14 +389,9 @@ impl BoundaryStepOver {
                 .at_most(sqrt(BEND_SHARE * axis.acceleration / second.at_least(1e-9)))
                 .at_most(cube_root(BEND_JERK_SHARE * axis.jerk / third.at_least(1e-9)));
         }
-        let least = limits
-            .axes
-            .iter()
-            .fold(f32::MAX, |least, axis| least.at_most(axis.jerk));
-        let passed =
-            |jump: f32| JUMP_JERK_SHARE * least * limits.period * limits.period / jump.at_least(1e-9);
-        speed = speed.at_most(passed(self.jump_beside));
-        let rests = passed(self.jump) < speed;
+        speed = speed.at_most(self.passed(self.jump_beside));
+        let rests = self.passed(self.jump) < speed;
+        let jump = if rests { self.jump_beside } else { self.jump };
         let first = if rests {
             self.jump_at * self.length
         } else {
@@ -402,7 +400,7 @@ impl BoundaryStepOver {
         let mut curve = Curve::NONE;
         let mut peak = 0.0;
         for _ in 0..ROUNDS {
-            self.curve = self.left_at(speed, peak);
+            self.curve = self.left_at(speed, peak, jump);
             curve = Curve::new(first, &self.curve, 0.0, 0.0);
             if rests {
                 curve = curve.and_then(self.length - first);
@@ -412,8 +410,8 @@ impl BoundaryStepOver {
         self.progress.lead(self.length, curve);
     }
 
-    /// What the bends leave at this speed.
-    fn left_at(&self, speed: f32, peak: f32) -> CurveLimits {
+    /// What the bends, and a jump of the direction that is passed, leave at this speed.
+    fn left_at(&self, speed: f32, peak: f32, jump: f32) -> CurveLimits {
         let mut left = CurveLimits {
             speed,
             acceleration: f32::MAX,
@@ -431,8 +429,9 @@ impl BoundaryStepOver {
         let acceleration = left.acceleration.at_most(sqrt(jerk * peak));
         let rise = acceleration * acceleration / (jerk * peak).at_least(1e-9);
         let product = (1.0 - V_TIMES_A * rise) * peak * acceleration;
+        let at_jump = peak * jump / (self.limits.period * self.limits.period);
         for (axis, [first, second, third]) in self.limits.axes.iter().zip(&self.bends) {
-            let taken = third * peak * peak * peak + 3.0 * second * product;
+            let taken = third * peak * peak * peak + 3.0 * second * product + at_jump;
             let room = (axis.jerk - taken).at_least(0.15 * axis.jerk);
             left.jerk = left.jerk.at_most(room / first.at_least(SLOPE_MIN));
         }
@@ -482,6 +481,22 @@ impl BoundaryStepOver {
     fn locate_next(&mut self, job: &Job<'_>, pace: f32) {
         let part = self.part_at(&self.progress.next(pace, job.header.period_s));
         self.ahead = self.locate(job, part).ok().map(|located| (part, located));
+    }
+
+    /// Whether it takes longer than a lift: it rests at one jump of the direction, and is slow for all others.
+    pub(crate) fn crawls(&self) -> bool {
+        self.length > LIFT_S * self.passed(self.jump_beside)
+    }
+
+    /// Speed at which a jump of the direction is passed, mm/s.
+    fn passed(&self, jump: f32) -> f32 {
+        let least = self
+            .limits
+            .axes
+            .iter()
+            .fold(f32::MAX, |least, axis| least.at_most(axis.jerk));
+        let period = self.limits.period;
+        JUMP_JERK_SHARE * least * period * period / jump.at_least(1e-9)
     }
 
     /// Feed for which it was planned, mm/s.

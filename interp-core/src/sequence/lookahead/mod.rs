@@ -103,6 +103,8 @@ pub(crate) struct Lookahead {
     begun: u16,
     halvings: u8,
     is_coarse: bool,
+    /// Stations of the patch are kept at its even cells alone.
+    keeps_even: bool,
     /// Length of a cell that is not halved, mm.
     cell_mm: f32,
     /// Least length of a stretch of the pass, mm, and length of the last pass.
@@ -124,6 +126,8 @@ pub(crate) struct Lookahead {
     has_bend: bool,
     bends: bool,
     may_turn: bool,
+    /// Stations are kept wherever derivatives change, not at even parts alone: on a pass of one patch around which the ball's centre moves about as far as the contact.
+    adapts: bool,
     /// Whether the curvature jumped at a patch boundary of the last pass, and so far.
     has_jump: bool,
     jumps: bool,
@@ -134,10 +138,12 @@ pub(crate) struct Lookahead {
     is_smooth: bool,
     speed: PathSpeed,
     window: Window,
-    /// On a front: the inverse limits of acceleration and jerk, and the inverse square and cube of the feed; the place before the window's, if it is not kept; the greatest
+    /// The inverse limits of acceleration and jerk, and the inverse square and cube of the feed; the place before the window's, if it is not kept; the greatest
     /// derivatives for which there is no room, for the next station.
     per_limit: [[f32; 2]; 3],
     slowest: [f32; 2],
+    /// Stations that a straight pass may have, with those of the turn before it.
+    most: u16,
     before: Option<Station>,
     missed: Option<Derivatives>,
     /// Arc from the start of the patch, mm, and of the pass to the patch, units of 2^-10 nm.
@@ -172,6 +178,7 @@ impl Lookahead {
         begun: 0,
         halvings: 0,
         is_coarse: false,
+        keeps_even: false,
         cell_mm: CELL_FINE_MM,
         least_mm: STRETCH_MIN_MM,
         pass_mm: 0.0,
@@ -186,6 +193,7 @@ impl Lookahead {
         has_bend: false,
         bends: false,
         may_turn: false,
+        adapts: false,
         has_jump: false,
         jumps: false,
         bend: [0.0; 3],
@@ -194,6 +202,7 @@ impl Lookahead {
         window: Window::EMPTY,
         per_limit: [[0.0; 2]; 3],
         slowest: [0.0; 2],
+        most: 0,
         before: None,
         missed: None,
         arc_mm: 0.0,
@@ -257,7 +266,7 @@ impl Lookahead {
         self.turn = *head;
         self.task = if has_head { Task::Head(0) } else { Task::Patch };
         (self.station, self.patches) = (0, 0);
-        (self.halvings, self.is_coarse) = (0, false);
+        (self.halvings, self.is_coarse, self.keeps_even) = (0, false, false);
         self.start_q10 = if has_head { head.half_q10() } else { 0 };
         out.head = if has_head { turn::STATIONS } else { 0 };
         out.head_q10 = self.start_q10;
@@ -372,10 +381,15 @@ impl Lookahead {
         }
         self.patch.lay(job, &out.route, &self.piece)?;
         self.range = self.piece.range;
+        if is_first {
+            self.measure_by(job, axes);
+        }
         if self.is_on_front() {
-            self.begin_stretch(job, axes, out)?;
+            self.adapts = false;
+            self.begin_stretch(out)?;
             return Ok(Task::Extend);
         }
+        self.may_join = false;
         out.point |= self.patch.point;
         if let Some(estimator) = estimator {
             if is_first && self.goes_on {

@@ -1,9 +1,9 @@
 //! The plan of one pass: what the look-ahead finds, and the feed that is planned from it.
 
-use super::PATCHES;
 use crate::feed::Q10_BITS;
 use crate::feed::limits::MotionLimits;
 use crate::feed::plan::Plan;
+use crate::feed::stations::STATIONS_MAX;
 use crate::feed::turn::Turn;
 use crate::job::program::Job;
 use crate::math::number::{MM_PER_NM, to_f32};
@@ -30,7 +30,7 @@ pub(crate) struct PassPlan {
     last_cells: u16,
     last_patch: u16,
     pub(super) cell_fraction: u64,
-    /// Patches of a group: where a pass has more than [`PATCHES`], the ends of groups are kept, with the greatest derivatives within them.
+    /// Patches of a group: where a pass has more than `PATCHES`, the ends of groups are kept, with the greatest derivatives within them.
     pub(super) group: u16,
     /// The pass is a single point; and the normals at it differ, so that the tool stands at its first place alone.
     pub(crate) point: bool,
@@ -42,9 +42,10 @@ pub(crate) struct PassPlan {
     pub(crate) faces_up: [bool; 2],
     /// Side parameter at start and end.
     pub(crate) sides: [SpanParameter; 2],
-    /// Of a pass on a front, a bit for each piece with which a stretch begins, and the first station of each stretch.
+    /// Of a pass on a front, a bit for each piece with which a stretch begins.
     pub(super) starts: [u32; PIECE_WORDS],
-    firsts: [u8; PATCHES as usize],
+    /// The first station of each stretch; of a straight pass the station at each end of an even cell.
+    firsts: [u8; STATIONS_MAX],
     /// Minimum interval of the pass.
     pub(crate) interval: f32,
     /// The pass after this one, where that is known from the pass alone, and whether a step-over on the surface leads there: along the boundary where both end.
@@ -79,7 +80,7 @@ impl PassPlan {
         faces_up: [false; 2],
         sides: [SpanParameter { span: 0, fraction: 0 }; 2],
         starts: [0; PIECE_WORDS],
-        firsts: [0; PATCHES as usize],
+        firsts: [0; STATIONS_MAX],
         interval: 0.0,
         next: None,
         steps_over: false,
@@ -140,12 +141,17 @@ impl PassPlan {
         if group * self.group != patch {
             return None;
         }
+        let station = *self.firsts.get(usize::from(self.even_station(group, within)))?;
+        Some(i64::from(self.plan.stations.get(u16::from(station)).arc_nm) << Q10_BITS)
+    }
+
+    /// Number of a station of a straight pass among those at the ends of even cells, by its group of patches and the cell within the patch.
+    pub(super) const fn even_station(&self, group: u16, within: u16) -> u16 {
         let before = match group {
             0 => 0,
             _ => self.first_cells + 1 + (group - 1) * (self.cells + 1),
         };
-        let station = self.head + before + within;
-        Some(i64::from(self.plan.stations.get(station).arc_nm) << Q10_BITS)
+        before + within
     }
 }
 
@@ -207,7 +213,7 @@ impl PassPlan {
         }
     }
 
-    /// Notes the first station of a stretch by its number: the next one, or one before that.
+    /// Notes the first station of a stretch, or of an even cell, by its number: the next one, or one before that.
     pub(super) fn note_first(&mut self, stretch: u16, back: u16) {
         let station = self.plan.stations.count().saturating_sub(back);
         if let (Some(first), Ok(station)) = (self.firsts.get_mut(usize::from(stretch)), u8::try_from(station))

@@ -4,7 +4,7 @@ use super::stretch::HALVED_MIN_MM;
 use super::{CELL_KEPT_MM, Lookahead, PATCHES, PassPlan, Task, check_crease, check_travel, stations_of};
 use crate::fault::{Fault, FaultKind, Result};
 use crate::feed::stations::{
-    CELL_MIN_MM, CELLS_FINE, CELLS_MANY, Derivatives, Station, WINDOW, Window, parts_of_cell,
+    CELL_MIN_MM, CELLS_FINE, CELLS_MANY, Derivatives, FIRST_NOISE, Station, WINDOW, Window, parts_of_cell,
 };
 use crate::job::program::Job;
 use crate::job::{AxisLimits, SurfaceKind};
@@ -24,6 +24,9 @@ const HARDLY_FITS: f32 = 0.5;
 
 /// Change of 1 - r k from patch to patch below which it is rounding of single precision.
 const NO_JUMP: f32 = 4e-6;
+
+/// Least jump of the path's direction, rad, that counts as a bend at a knot.
+const KINK_MIN: f32 = 1e-4;
 
 /// Relative difference of the two-point and the three-point rule of a cell's arc from which on the latter is taken, and up to which: below is rounding, above
 /// neither is trusted.
@@ -50,6 +53,7 @@ impl Lookahead {
         let turns =
             |[length, centre]: &[f32; 2]| CENTRE_SHARE * centre > *length || hardly_fits(*length, *centre);
         self.may_turn = halves.iter().any(turns);
+        self.adapts = spans == 1 && !self.may_turn;
         let length = length.at_least(by_centre);
         if out.cells == 0 {
             let [start, end] = out.route.ends;
@@ -106,7 +110,7 @@ impl Lookahead {
             let least = CELLS_FINE.min(whole(length / HALVED_MIN_MM).max(1));
             self.looks = self.looks.max(least.div_ceil(self.kept.max(1)));
         }
-        out.plan.stations.note_cells(out.cells, out.group);
+        out.plan.stations.note_group(out.group);
         self.begun = out.plan.stations.count();
         self.divide_patch();
     }
@@ -178,44 +182,33 @@ impl Lookahead {
     pub(super) fn differentiate(&mut self, at: u8, out: &mut PassPlan) {
         let behind = self.window.count().saturating_sub(1 + usize::from(at));
         let station = self.station.saturating_sub(u16::try_from(behind).unwrap_or(0));
-        let looks = self.looks.max(1);
-        let (kept, rest) = (station / looks, station % looks);
-        let stations = &mut out.plan.stations;
         if out.group > 1 {
+            let stations = &mut out.plan.stations;
             let q = self.window.derivatives(usize::from(at));
             let begins = station == 0 && self.patches.is_multiple_of(out.group);
             for back in [1, 2] {
+                stations.note_spacing(back, self.window.spacing_mm());
                 if let Some(place) = stations.back_mut(back) {
                     widen(&mut place.q, &q, begins || back == 1);
                 }
             }
-        } else if self.is_on_front() {
+        } else {
             self.keep_derivatives(station, usize::from(at), out);
-        } else if rest == 0 {
-            let q = self.window.derivatives(usize::from(at));
-            if self.may_turn {
-                self.note_turn(&q);
-            }
-            let back = self.station / looks - kept + 1;
-            if station == 0 {
-                self.store_start(back, q, out);
-            } else if let Some(place) = stations.back_mut(back) {
-                place.q = q;
-            }
         }
     }
 
     /// Stores the derivatives at the start of a patch, or of a stretch, in the station so far from the last one.
     pub(super) fn store_start(&mut self, back: u16, q: Derivatives, out: &mut PassPlan) {
         let stations = &mut out.plan.stations;
+        stations.note_spacing(back, self.window.spacing_mm());
         let Some(place) = stations.back_mut(back) else {
             return;
         };
         // The direction at the start of a patch is that at the end of the last, where it is known not to jump.
-        let direction = core::mem::replace(&mut place.q, q);
-        if self.is_smooth && self.has_derivatives {
-            for (q, direction) in place.q.iter_mut().zip(&direction) {
-                q[0] = direction[0];
+        let before = core::mem::replace(&mut place.q, q);
+        if self.is_smooth && self.has_derivatives && (self.may_join || !self.bends_at_knot(&before, &q)) {
+            for (q, before) in place.q.iter_mut().zip(&before) {
+                q[0] = before[0];
             }
         }
         if !self.has_derivatives {
@@ -228,6 +221,27 @@ impl Lookahead {
                 }
             }
         }
+    }
+
+    /// Whether the direction of the path jumps at a knot by more than the error of its differences: the lines of a smooth surface may bend there.
+    fn bends_at_knot(&self, before: &Derivatives, behind: &Derivatives) -> bool {
+        let cell = self.window.spacing_mm();
+        let (mut jump, mut first) = (0.0_f32, 0.0_f32);
+        let (mut turn, mut change) = (0.0_f32, 0.0_f32);
+        for (before, behind) in before.iter().zip(behind) {
+            jump = jump.at_least((behind[0] - before[0]).abs());
+            first = first.at_least(before[0].abs()).at_least(behind[0].abs());
+            turn = turn.at_least(before[1].abs()).at_least(behind[1].abs());
+            change = change.at_least(before[2].abs()).at_least(behind[2].abs());
+        }
+        let (turn, change) = (turn * cell / first, change * cell * cell / first);
+        // A front bends little, but its stretches have few cells.
+        let error = if self.is_on_front() {
+            2.0 * (turn + change)
+        } else {
+            16.0 * (turn * turn * turn * turn + change * change)
+        };
+        jump > KINK_MIN + FIRST_NOISE / cell + first * error
     }
 
     /// Evaluations of the step-over estimator at a station.
@@ -309,34 +323,35 @@ impl Lookahead {
         Ok(())
     }
 
-    /// Appends the station to the plan's if it is kept, with the last one's derivatives until its own are taken.
+    /// Appends the station to the plan's if it is kept before its derivatives are known: the first one of a patch, with the last one's derivatives until its own are taken; of a
+    /// stretch that has none, the end.
     fn keep(&self, out: &mut PassPlan) {
         let arc_nm = self.arc_nm(self.arc_mm);
-        let stations = &mut out.plan.stations;
-        let q = stations.back_mut(1).map_or([[0.0; 3]; 3], |last| last.q);
-        let begins = self.station == 0 && self.patches.is_multiple_of(out.group);
+        let q = out.plan.stations.back_mut(1).map_or([[0.0; 3]; 3], |last| last.q);
         if out.group > 1 {
-            if begins {
-                let station = Station {
-                    arc_nm,
-                    q: [[0.0; 3]; 3],
-                };
-                stations.push(station);
-                stations.push(station);
-            } else if let Some(last) = stations.back_mut(1) {
+            let station = Station {
+                arc_nm,
+                q: [[0.0; 3]; 3],
+            };
+            if self.station == 0 && self.patches.is_multiple_of(out.group) {
+                self.note_even(0, out);
+                out.plan.stations.push(station);
+                out.plan.stations.push(station);
+            } else if let Some(last) = out.plan.stations.back_mut(1) {
                 last.arc_nm = arc_nm;
             }
-        } else if self.station == 0 || self.is_kept() {
-            stations.push(Station { arc_nm, q });
+        } else if self.station == 0 || (self.is_on_front() && self.is_short) {
+            self.note_even(self.station, out);
+            out.plan.stations.push(Station { arc_nm, q });
         }
     }
 
-    /// Whether the station, not the first of its patch, is kept before its derivatives are known: on a front only where there will be none.
-    const fn is_kept(&self) -> bool {
-        if self.is_on_front() {
-            self.is_short
-        } else {
-            self.station.is_multiple_of(self.looks)
+    /// Notes a station of a straight pass at the start of one of the even cells of its patch, which is appended next.
+    pub(super) fn note_even(&self, station: u16, out: &mut PassPlan) {
+        if !self.is_on_front() {
+            let within = station.checked_div(self.looks).unwrap_or(0);
+            let number = out.even_station(self.patches.checked_div(out.group).unwrap_or(0), within);
+            out.note_first(number, 0);
         }
     }
 

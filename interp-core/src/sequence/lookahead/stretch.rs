@@ -1,11 +1,11 @@
 //! Stretches of a pass on a front: pieces of one path span, together long enough for differences.
 
 use super::stations::widen;
-use super::{Lookahead, PATCHES, PassPlan, STATIONS, STRETCH_MIN_MM, Task};
+use super::{Lookahead, PATCHES, PassPlan, STATIONS, STRETCH_MIN_MM, Task, has_turns};
 use crate::fault::Result;
 use crate::feed::limits::{AxisMotion, MotionLimits};
 use crate::feed::stations::{CELL_FINE_MM, CELL_MIN_MM, CELLS_FINE, Derivatives, PARTS_MAX, Station, Window};
-use crate::feed::{Q10_BITS, to_q10};
+use crate::feed::{Q10_BITS, to_q10, turn};
 use crate::job::AxisLimits;
 use crate::job::program::Job;
 use crate::math::arith::{fraction_to_f32, power_of_two, sqrt, truncated};
@@ -15,11 +15,13 @@ use crate::surface::PathSpeed;
 
 const STRETCH_KNOT_MM: f32 = 0.3;
 const STRETCH_SHORT_MM: f32 = 0.2;
+/// The least with derivatives of its own at an end of the pass, mm.
+const STRETCH_END_MM: f32 = 0.02;
 
 /// Change of a second and of a third derivative of an axis from which on a station within a stretch is kept, as shares of what takes the axis to its limit. Error of a third
 /// derivative by rounded positions, times the third power of a cell's length, mm.
-const NOTABLE_SECOND: f32 = 0.08;
-const NOTABLE_THIRD: f32 = 0.15;
+const NOTABLE_SECOND: f32 = 0.03;
+const NOTABLE_THIRD: f32 = 0.06;
 /// Stations kept of those looked at on a piece up to which these shares hold, and by how much more they are at most where there is room for fewer.
 const KEPT_SHARE: f32 = 1.0;
 const LESS_NOTABLE_MAX: f32 = 1.4;
@@ -27,7 +29,7 @@ const THIRD_NOISE: f32 = 60e-6;
 /// Turn within a cell, and its change from one to the next, from which on a stretch is looked at again with shorter cells, rad; how often they are halved.
 const TURN_OF_CELL: f32 = 0.12;
 const CHANGE_OF_CELL: f32 = 0.008;
-const HALVINGS_MAX: u8 = 2;
+const HALVINGS_MAX: u8 = 3;
 /// The same on a patch of a straight pass into which the ball hardly fits, or where it goes around an edge: all of it is looked at again; shorter cells are not halved, mm.
 const CHANGE_STRAIGHT: f32 = 0.04;
 const HALVINGS_STRAIGHT: u8 = 4;
@@ -50,12 +52,7 @@ impl Lookahead {
     }
 
     /// Begins a stretch of a pass on a front.
-    pub(super) fn begin_stretch(
-        &mut self,
-        job: &Job<'_>,
-        axes: &AxisLimits,
-        out: &mut PassPlan,
-    ) -> Result<()> {
+    pub(super) fn begin_stretch(&mut self, out: &mut PassPlan) -> Result<()> {
         let PathSpeed {
             inv_speed,
             log_speed_derivative,
@@ -96,6 +93,16 @@ impl Lookahead {
             (self.pass_mm / f32::from(room)).at_least(STRETCH_MIN_MM)
         };
         out.set_cells(1);
+        Ok(())
+    }
+
+    /// Sets what notable changes and the noise of derivatives are measured by, for a pass.
+    pub(super) fn measure_by(&mut self, job: &Job<'_>, axes: &AxisLimits) {
+        self.most = if has_turns(job) {
+            STATIONS - turn::STATIONS
+        } else {
+            STATIONS
+        };
         let feed = job.header.feed_mm_s;
         let limits = MotionLimits::new(axes, feed, job.header.period_s);
         self.per_limit = limits.inverse.map(
@@ -116,7 +123,6 @@ impl Lookahead {
                 self.cell_mm *= CELL_STEP;
             }
         }
-        Ok(())
     }
 
     /// Lengthens the stretch by a piece, or ends it.
@@ -139,9 +145,15 @@ impl Lookahead {
         let length = self.part_mm(end.saturating_sub(start));
         let whole = |value: f32| u16::try_from(truncated(value)).unwrap_or(u16::MAX);
         let share = power_of_two(-i32::from(self.halvings));
-        let fine = whole(length / (self.cell_mm * share)).max(CELLS_FINE);
-        let most = whole(length / (CELL_MIN_MM * share)).max(2);
-        self.is_short = length < STRETCH_SHORT_MM;
+        let fine = whole(length / self.cell_mm).max(CELLS_FINE) << self.halvings;
+        // Near a rest the tool is slow, and rounding does no harm.
+        let (short, least) = if self.patches == 0 || self.after.is_none() {
+            (STRETCH_END_MM, CELLS_FINE)
+        } else {
+            (STRETCH_SHORT_MM, 2)
+        };
+        let most = whole(length / (CELL_MIN_MM * share)).max(least);
+        self.is_short = length < short;
         self.looks = if self.is_short {
             1
         } else {
@@ -150,9 +162,6 @@ impl Lookahead {
         self.cells = self.looks;
         let part = end.saturating_sub(start).checked_div(u64::from(self.cells));
         self.cell_fraction = part.unwrap_or(u64::MAX);
-        if !self.is_short {
-            out.plan.stations.note_spacing(length / f32::from(self.cells));
-        }
         self.window = Window::EMPTY;
         self.arc_mm = 0.0;
         self.station = 0;
@@ -193,9 +202,17 @@ impl Lookahead {
             let cell = self.arc_mm / f32::from(self.cells);
             (HALVINGS_STRAIGHT, cell < HALVED_MIN_MM)
         };
-        if !is_coarse || is_fine || self.halvings >= most {
-            self.halvings = 0;
+        let is_last = is_fine || self.halvings >= most;
+        if !is_coarse || (is_last && (!self.adapts || self.keeps_even)) {
+            (self.halvings, self.keeps_even) = (0, false);
             return None;
+        }
+        if is_last {
+            // Known too coarsely for stations of its own.
+            self.keeps_even = true;
+            out.plan.stations.truncate(self.begun);
+            self.divide_patch();
+            return Some(Task::Station);
         }
         self.halvings += 1;
         out.plan.stations.truncate(self.begun);
@@ -230,7 +247,9 @@ impl Lookahead {
     /// notably since the last one. Between stations they are taken for linear.
     pub(super) fn keep_derivatives(&mut self, station: u16, at: usize, out: &mut PassPlan) {
         let q = self.window.derivatives(at);
-        self.note_turn(&q);
+        if self.adapts || self.may_turn || self.is_on_front() {
+            self.note_turn(&q);
+        }
         let here = Station {
             arc_nm: self.arc_nm(self.window.arc_mm(at)),
             q,
@@ -242,6 +261,8 @@ impl Lookahead {
             return;
         }
         let is_end = station == self.cells;
+        let is_even = !self.is_on_front() && station.is_multiple_of(self.looks);
+        let is_kept = is_end || is_even;
         let (room, tolerance) = self.room(out);
         if let Some(last) = out.plan.stations.back_mut(1)
             && self.is_notable(&last.q, &q, tolerance)
@@ -251,8 +272,10 @@ impl Lookahead {
                 Some(before) => (true, self.is_notable(&before.q, &q, tolerance)),
                 None => (false, true),
             };
-            let wanted = u16::from(wants_before) + u16::from(wants_here && !is_end);
-            if wanted > room {
+            let wanted = u16::from(wants_before) + u16::from(wants_here && !is_kept);
+            if !self.is_on_front() && (!self.adapts || self.keeps_even || wanted > room) {
+                // The even stations alone.
+            } else if wanted > room {
                 // The greatest on both sides instead.
                 let missed = self.missed.get_or_insert(q);
                 for q in before.iter().map(|before| &before.q).chain([&q]) {
@@ -263,13 +286,17 @@ impl Lookahead {
                 if let Some(before) = before {
                     self.append(before, out);
                 }
-                if wants_here && !is_end {
+                if wants_here && !is_kept {
                     self.append(here, out);
                     return;
                 }
             }
         }
-        if is_end {
+        if is_kept {
+            if is_even {
+                self.note_even(station, out);
+            }
+            self.before = None;
             self.append(here, out);
         } else {
             self.before = Some(here);
@@ -299,10 +326,21 @@ impl Lookahead {
             widen(&mut station.q, &missed, false);
         }
         out.plan.stations.push(station);
+        out.plan.stations.note_spacing(1, self.window.spacing_mm());
     }
 
     /// Stations that may be kept besides those at the stretches' ends: one of each piece that is left, two where a knot is crossed.
     fn room(&self, out: &PassPlan) -> (u16, f32) {
+        if !self.is_on_front() {
+            let [_, end] = out.route.ends;
+            let patches = self.piece.position.span.abs_diff(end.span);
+            let here = self.cells.saturating_sub(self.station) / self.looks.max(1) + 1;
+            let left = patches * (out.cells + 1) + here;
+            let room = self.most.saturating_sub(out.plan.stations.count() + left + SPARE);
+            // Where there is room for few of those that are looked at, for the most notable.
+            let looks = self.cells.saturating_sub(self.station);
+            return (room, (f32::from(looks) / f32::from(room.max(1))).at_least(1.0));
+        }
         let [_, last] = self.stretch;
         let number = last.front.map_or(0, |front| front.number);
         let pieces = out.route.front.map_or(0, |front| front.pieces);

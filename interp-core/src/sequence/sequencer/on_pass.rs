@@ -18,6 +18,9 @@ use crate::sequence::turning::Part;
 /// in a period: a twelfth of 0.15 um takes 3 % of the jerk limit.
 const END_Q10: i64 = 300_000 << 10;
 const END_PARTS: i64 = 12;
+/// The part of the difference at a station that is taken in a period, and what is taken at once, units of 2^-10 nm: the plan's speed is another there.
+const PARTS: i64 = 8;
+const AT_ONCE_Q10: i64 = 1 << 10;
 
 impl Sequencer {
     /// Enters the pass, which begins at the tool's position, and emits its first sample.
@@ -202,16 +205,11 @@ impl Sequencer {
             return;
         }
         let (now, _) = both(&mut self.plans, self.second);
-        if let Some(apart_q10) = self.correction {
-            if self.follower.correct(&now.plan, apart_q10) {
-                self.correction = None;
-            }
-            return;
-        }
         let Some(cell) = run
             .cell(|patch| now.cells_of(patch))
             .filter(|cell| *cell != self.cell)
         else {
+            self.correct_in_part();
             return;
         };
         self.cell = cell;
@@ -225,6 +223,21 @@ impl Sequencer {
         };
         let arc_q10 = start_q10 + crate::feed::to_q10(since_mm);
         self.correction = Some(arc_q10 - self.follower.arc_q10());
+    }
+
+    /// Applies a part of the correction that was measured.
+    fn correct_in_part(&mut self) {
+        let (now, _) = both(&mut self.plans, self.second);
+        let Some(apart_q10) = self.correction else {
+            return;
+        };
+        let part_q10 = if apart_q10.abs() > AT_ONCE_Q10 {
+            apart_q10 / PARTS
+        } else {
+            apart_q10
+        };
+        let left_q10 = apart_q10 - self.follower.correct(&now.plan, part_q10);
+        self.correction = Some(left_q10).filter(|left| *left != 0);
     }
 
     /// Corrects the progress by the arc left, near the end of a pass: what is left of the stations' error would be in the last step. On a front they are far apart;
