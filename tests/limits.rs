@@ -163,6 +163,27 @@ fn velocities_hold() {
     }
 }
 
+/// Runs of the campaign that used 1.2 to 30 of a limit: stations too far apart, bends at knots, corrections in one move.
+#[test]
+fn runs_of_the_campaign_that_broke_limits() {
+    let straight: &[u64] = &[8, 32, 52, 140, 148, 176, 186, 188];
+    let curved: &[u64] = &[41, 73, 101, 107, 129, 171, 181, 199];
+    for (numbers, spacings) in [(straight, &STRAIGHT[..]), (curved, &CURVED)] {
+        for number in numbers {
+            let mut job = random_case(*number, true).unwrap();
+            for spacing in spacings {
+                job.spacing = *spacing;
+                let used = uses(&job).unwrap();
+                let holds = used
+                    .iter()
+                    .zip(PERMITTED)
+                    .all(|(used, most)| *used <= most + 1e-9);
+                assert!(holds, "{number} {spacing:?}: {used:?}");
+            }
+        }
+    }
+}
+
 /// `RUNS=200 TEST campaign_of_limits -- --ignored --nocapture`
 #[test]
 #[ignore = "minutes"]

@@ -110,38 +110,17 @@ fn left_out_samples_are_no_gouge() {
     let oracle = Oracle::new(&job).unwrap();
     let (step, ramp) = (1e-4, 60_i32);
     let exact = flat(0.05 * 30.0);
+    // The step grows from 0 to its full size and falls to 0 again.
+    let mut places = vec![0.0];
+    while places[places.len() - 1] < 1.0 {
+        let (at, k) = (places[places.len() - 1], places.len());
+        let rise = (k as f64 / f64::from(ramp)).min(1.0).powi(2);
+        let fall = ((1.0 - at) / (step * f64::from(ramp)) + 0.01).min(1.0);
+        places.push((at + step * rise * fall).min(1.0));
+    }
     for spacing_nm in [0.0, 2e3, 2e4, 1.1e5, 1e6] {
         let mut track = ToolPath::with_spacing(spacing_nm, job.scallop_mm);
-        let mut tick = 0;
-        for (pass, side) in (0_u32..).zip([0.0, 0.02, 0.07, 0.1]) {
-            // The step grows from 0 to its full size and falls to 0 again.
-            let mut places = vec![0.0];
-            while places[places.len() - 1] < 1.0 {
-                let (at, k) = (places[places.len() - 1], places.len());
-                let rise = (k as f64 / f64::from(ramp)).min(1.0).powi(2);
-                let fall = ((1.0 - at) / (step * f64::from(ramp)) + 0.01).min(1.0);
-                places.push((at + step * rise * fall).min(1.0));
-            }
-            for (k, path) in places.iter().enumerate() {
-                let (u, v) = oracle.swapped(*path, side);
-                let contact = oracle.contact(u, v).unwrap();
-                let nm = |mm: DVec3| mm.to_array().map(|mm| (mm * 1e6).round() as i32);
-                let sample = PassSample {
-                    tick,
-                    pass,
-                    u,
-                    v,
-                    cc_nm: nm(contact.cc_mm),
-                    cl_nm: nm(contact.cl_mm),
-                    feed_mm_s: 1.0,
-                    interval: 0.0,
-                    first_of_pass: k == 0,
-                    last_of_pass: k + 1 == places.len(),
-                };
-                track.add(&sample, job.along);
-                tick += 1;
-            }
-        }
+        add_passes(&mut track, &oracle, &[0.0, 0.02, 0.07, 0.1], &places);
         let found = measure(&job, &oracle, &track, true, &Requirements::default(), &());
         assert_eq!(found.gouge, None, "{spacing_nm} nm");
         assert_eq!(found.gouge_verdict, Verdict::Met, "{spacing_nm} nm");

@@ -35,13 +35,21 @@ fn job(surface: SurfaceSpec, along: Along, side: Side, scallop_mm: f64) -> Job {
 
 /// A tool path on these passes, with `steps` samples on each, evenly spread over the parameter.
 fn track(oracle: &Oracle, sides: &[f64], steps: u32) -> ToolPath {
-    let mut track = ToolPath::default();
     let [low, high] = oracle.path_range();
+    let places: Vec<f64> = (0..=steps)
+        .map(|k| low + (high - low) * f64::from(k) / f64::from(steps))
+        .collect();
+    let mut track = ToolPath::default();
+    add_passes(&mut track, oracle, sides, &places);
+    track
+}
+
+/// Adds passes with samples at these path parameters.
+fn add_passes(track: &mut ToolPath, oracle: &Oracle, sides: &[f64], places: &[f64]) {
     let mut tick = 0;
     for (pass, side) in (0_u32..).zip(sides) {
-        for k in 0..=steps {
-            let path = low + (high - low) * f64::from(k) / f64::from(steps);
-            let (u, v) = oracle.swapped(path, *side);
+        for (k, path) in places.iter().enumerate() {
+            let (u, v) = oracle.swapped(*path, *side);
             let contact = oracle.contact(u, v).unwrap();
             let nm = |mm: DVec3| mm.to_array().map(|mm| (mm * 1e6).round() as i32);
             let sample = PassSample {
@@ -54,13 +62,12 @@ fn track(oracle: &Oracle, sides: &[f64], steps: u32) -> ToolPath {
                 feed_mm_s: 10.0,
                 interval: 0.0,
                 first_of_pass: k == 0,
-                last_of_pass: k == steps,
+                last_of_pass: k + 1 == places.len(),
             };
             track.add(&sample, oracle.along);
             tick += 1;
         }
     }
-    track
 }
 
 fn measured(job: &Job, sides: &[f64], steps: u32) -> SweptResult {
