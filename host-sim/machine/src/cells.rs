@@ -29,7 +29,7 @@ pub const PASS_S: f64 = 0.15;
 const INTERVALS_MAX: usize = CROSSINGS_MAX / 2;
 
 /// Gives the region of a job its cells, by the direction of its passes. Without axis limits there are no links: only what the core cannot keep is parted.
-pub(crate) fn settle(job: &mut Job) {
+pub(crate) fn choose(job: &mut Job) {
     let Some(region) = &job.region else {
         return;
     };

@@ -70,7 +70,7 @@ pub(crate) fn fastest(first: TrialResult, second: TrialResult) -> TrialResult {
 /// The job as given cannot be prepared, or, with `"auto"`, no choice can be machined.
 pub fn choose(mut job: Job) -> Result<Ready, DirectionError> {
     if !job.origin.has_to_choose() {
-        cells::settle(&mut job);
+        cells::choose(&mut job);
         let prepared = prepare(&job).map_err(DirectionError::Refused)?;
         return Ok((job, prepared));
     }
@@ -166,7 +166,7 @@ pub(crate) fn run_trial(job: &Job, along: Along, spacing: Spacing, ticks_max: u6
     (job.along, job.spacing) = (along, spacing);
     job.origin.set_along_choice(AlongChoice::Given);
     job.origin.set_start_choice(StartChoice::Given);
-    cells::settle(&mut job);
+    cells::choose(&mut job);
     let trial = |ticks: u64, rejection: Option<String>| SpacingTrial {
         spacing,
         ticks,

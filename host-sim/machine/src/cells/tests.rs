@@ -52,7 +52,7 @@ fn cells_tile_the_region() {
         }
         let along = [Along::U, Along::V][case as usize % 2];
         let mut job = plate(along, loops);
-        settle(&mut job);
+        choose(&mut job);
         let region = job.region.unwrap();
         parted += usize::from(region.cells.len() > 1);
         let parts = region.parts();
@@ -78,7 +78,7 @@ fn a_hole_parts_a_region() {
         if !limits {
             job.machine.limits = None;
         }
-        settle(&mut job);
+        choose(&mut job);
         job.region.unwrap().cells
     };
     let large = cells(square(0.3, 0.7), true);
@@ -102,13 +102,13 @@ fn a_comb_is_parted() {
     for limits in [Some(AxisLimits::DEFAULT), None] {
         let mut job = plate(Along::U, loops.clone());
         job.machine.limits = limits;
-        settle(&mut job);
+        choose(&mut job);
         let cells = &job.region.as_ref().unwrap().cells;
         assert!(cells.len() >= 4, "{}", cells.len());
         crate::prepare::prepare(&job).unwrap();
         // Across the teeth no line meets more than two.
         job.along = Along::V;
-        settle(&mut job);
+        choose(&mut job);
         crate::prepare::prepare(&job).unwrap();
     }
 }
@@ -135,7 +135,7 @@ fn parts_beside_a_crease_are_cells() {
     let part = |from: f64, to: f64| vec![[from, 0.0], [to, 0.0], [to, 1.0], [from, 1.0]];
     for along in [Along::U, Along::V] {
         let mut job = roof(along, vec![part(0.0, 0.999), part(1.001, 2.0)]);
-        settle(&mut job);
+        choose(&mut job);
         assert_eq!(job.region.as_ref().unwrap().cells.len(), 2);
         let prepared = crate::prepare::prepare(&job).unwrap();
         let mut machine = crate::Machine::load(&prepared).unwrap();
@@ -162,7 +162,7 @@ fn parts_beside_a_crease_are_cells() {
         );
     }
     let mut job = roof(Along::U, vec![part(0.0, 2.0)]);
-    settle(&mut job);
+    choose(&mut job);
     let prepared = crate::prepare::prepare(&job).unwrap();
     let fault = crate::Machine::load(&prepared).unwrap().run(|_| true);
     assert_eq!(fault.unwrap_err().kind, interp_core::FaultKind::DegenerateSurface);

@@ -18,9 +18,9 @@ const POLE_STEP: f64 = 1e-4;
 const POINT_PLACES: u32 = 24;
 const POINT_MM: f64 = 1e-6;
 const POINT_STEP: f64 = 1e-6;
-/// Least cosine between a normal at a point and the way from there into the surface for a hollow: what is less sinks the ball by less than 13 nm for each
+/// Least cosine between a normal at a point and the way from there into the surface at a concave point: what is less sinks the ball by less than 13 nm for each
 /// millimetre of its radius.
-const HOLLOW_MIN: f64 = 5e-3;
+const CONCAVE_MIN: f64 = 5e-3;
 /// Ratio of the derivatives' lengths, each times its range, below which the shorter one counts as zero.
 const POLE_SHARE: f64 = 1e-9;
 
@@ -181,7 +181,7 @@ pub(super) fn centre_mm(job: &Job, sign: f64, [u, v]: [f64; 2]) -> Option<DVec3>
     Some(frame.point + sign * job.radius_mm * normal)
 }
 
-/// Checks that no boundary is a point in a hollow, like the tip of a countersink: the core checks the fit of the ball along the pass and across it, and at a point only
+/// Checks that no boundary is a concave point, like the tip of a countersink: the core checks the fit of the ball along the pass and across it, and at a point only
 /// along it.
 ///
 /// # Errors
@@ -199,11 +199,11 @@ pub(super) fn check_points(job: &Job, sign: f64) -> Result<(), JobError> {
             Along::V => (vs, us),
         };
         for [end, from] in [own, [own[1], own[0]]] {
-            if is_hollow_point(&surface, along, [end, from], other, sign) {
+            if is_concave_point(&surface, along, [end, from], other, sign) {
                 let name = along.name();
                 return Err(job.origin.error(
                     "surface",
-                    format!("the boundary {name} = {end} is a point in a hollow, where a ball that touches one side cuts into the other"),
+                    format!("the boundary {name} = {end} is a concave point, where a ball that touches one side cuts into the other"),
                     format!("end the surface before the point, by its range of {name}, or draw a [region] that leaves it out"),
                 ));
             }
@@ -213,7 +213,7 @@ pub(super) fn check_points(job: &Job, sign: f64) -> Result<(), JobError> {
 }
 
 /// Whether the boundary of constant `along` at `end` is a point from which the surface rises towards the tool on a side.
-fn is_hollow_point(
+fn is_concave_point(
     surface: &SurfaceEvaluator,
     along: Along,
     [end, from]: [f64; 2],
@@ -238,7 +238,7 @@ fn is_hollow_point(
             Some((sign * unit(frame.u.cross(frame.v))?, unit(frame.point - tip)?))
         })
         .collect();
-    let rises = |normal: &DVec3| sides.iter().any(|(_, way)| normal.dot(*way) > HOLLOW_MIN);
+    let rises = |normal: &DVec3| sides.iter().any(|(_, way)| normal.dot(*way) > CONCAVE_MIN);
     sides.iter().any(|(normal, _)| rises(normal))
 }
 
@@ -303,12 +303,12 @@ mod tests {
     }
 
     #[test]
-    fn points_in_hollows_are_refused() {
+    fn concave_points_are_refused() {
         for along in ["u", "v"] {
             for rise in [[0.0, 200.0], [0.0, 10.0], [100.0, 2.0]] {
                 let error = super::super::prepare(&tip(rise, along)).unwrap_err();
                 assert!(
-                    error.what().contains("u = 0 is a point in a hollow"),
+                    error.what().contains("u = 0 is a concave point"),
                     "{along} {rise:?}: {error}"
                 );
             }
