@@ -184,6 +184,18 @@ fn runs_of_the_campaign_that_broke_limits() {
     }
 }
 
+/// A front whose curve would reach beyond the last boundary between two stations used 3.3 of an acceleration. Another cause leaves 1.06.
+#[test]
+fn no_corner_at_the_last_boundary() {
+    let mut job = random_case(40, true).unwrap();
+    for spacing in CURVED {
+        job.spacing = spacing;
+        let [_, acceleration, _] = uses(&job).unwrap();
+        println!("{spacing:?}: {acceleration}");
+        assert!(acceleration <= 1.1, "{spacing:?}: acceleration {acceleration}");
+    }
+}
+
 /// `RUNS=200 TEST campaign_of_limits -- --ignored --nocapture`
 #[test]
 #[ignore = "minutes"]

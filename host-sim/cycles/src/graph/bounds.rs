@@ -446,7 +446,7 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "pieces of the planning of a period: PIECES_MAX",
     ),
     (
-        "interp_core::pass::front::advance::measuring::finds_crest",
+        "interp_core::pass::front::advance::measuring::has_crest",
         16,
         "places that are passed over: CHUNK",
     ),

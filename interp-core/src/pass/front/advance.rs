@@ -452,6 +452,11 @@ impl Advance {
             }
             Task::Substitute => {
                 spline::substitute(table, job, Column::NextSlope, backwards);
+                let end = self.direction.end;
+                spline::keep_before(table, job, [Column::Next, Column::NextSlope], backwards + 1, end);
+                if backwards == 0 {
+                    spline::keep_before(table, job, [Column::Next, Column::NextSlope], 0, end);
+                }
                 self.finish_station(job, table, backwards);
             }
             Task::Compare => self.compare(job, table, station),

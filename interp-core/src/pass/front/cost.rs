@@ -13,7 +13,7 @@ pub(crate) const COPY: u32 = 4_300;
 pub(crate) const SWEEP: u32 = 7_400;
 pub(crate) const COMPARE: u32 = 15_200;
 pub(crate) const HULL: u32 = 8_400;
-pub(crate) const SUBSTITUTE: u32 = 10_400;
+pub(crate) const SUBSTITUTE: u32 = 11_000;
 
 /// Stations of a front, in search for its parts, a chunk.
 pub(crate) const PART: u32 = 7_500;

@@ -167,6 +167,39 @@ pub(crate) fn substitute<W: DerefMut<Target = [i32]>>(
     table.set_real(slope, station, bounded(value, length));
 }
 
+/// Limits the slope at a station so that no cubic between two stations before a boundary reaches beyond it: its Bernstein coefficients are before it.
+pub(crate) fn keep_before<W: DerefMut<Target = [i32]>>(
+    table: &mut Table<W>,
+    job: &Job<'_>,
+    [front, slope]: [Column; 2],
+    station: u16,
+    boundary: i32,
+) {
+    let stations = table.stations();
+    if station >= stations.count() {
+        return;
+    }
+    let value = table.real(slope, station);
+    let (interval, beside) = if value > 0.0 {
+        (station, station + 1)
+    } else {
+        (station.wrapping_sub(1), station.wrapping_sub(1))
+    };
+    let left = |station: u16| boundary.saturating_sub(table.word(front, station));
+    if beside >= stations.count() || left(station) <= 0 || left(beside) <= 0 {
+        return;
+    }
+    let most = 3.0 * to_f32(left(station)) * UNIT;
+    let length = stations.length(job, interval);
+    if value.abs() * length > most {
+        table.set_real(
+            slope,
+            station,
+            value.at_most(most / length).at_least(-most / length),
+        );
+    }
+}
+
 /// A slope that changes by the whole parameter over an interval of this length at most, so that no coefficient overflows.
 fn bounded(slope: f32, length: f32) -> f32 {
     let most = 1.0 / length;

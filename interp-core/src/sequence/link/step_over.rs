@@ -484,7 +484,7 @@ impl BoundaryStepOver {
     }
 
     /// Whether it takes longer than a lift: it rests at one jump of the direction, and is slow for all others.
-    pub(crate) fn crawls(&self) -> bool {
+    pub(crate) fn is_slower_than_lift(&self) -> bool {
         self.length > LIFT_S * self.passed(self.jump_beside)
     }
 

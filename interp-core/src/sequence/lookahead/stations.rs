@@ -26,7 +26,7 @@ const HARDLY_FITS: f32 = 0.5;
 const NO_JUMP: f32 = 4e-6;
 
 /// Least jump of the path's direction, rad, that counts as a bend at a knot.
-const KINK_MIN: f32 = 1e-4;
+const BEND_MIN: f32 = 1e-4;
 
 /// Relative difference of the two-point and the three-point rule of a cell's arc from which on the latter is taken, and up to which: below is rounding, above
 /// neither is trusted.
@@ -241,7 +241,7 @@ impl Lookahead {
         } else {
             16.0 * (turn * turn * turn * turn + change * change)
         };
-        jump > KINK_MIN + FIRST_NOISE / cell + first * error
+        jump > BEND_MIN + FIRST_NOISE / cell + first * error
     }
 
     /// Evaluations of the step-over estimator at a station.

@@ -329,7 +329,7 @@ impl Sequencer {
         if self.has_step_over && !self.step_over.is_planned() {
             self.pending = self.step_over.work(job, axes).err();
             let may_lift = now.faces_up[1] && (next.faces_up[0] || !job.header.spacing.is_constant());
-            if self.step_over.is_planned() && self.step_over.crawls() && may_lift {
+            if self.step_over.is_planned() && self.step_over.is_slower_than_lift() && may_lift {
                 now.steps_over = false;
                 (self.has_step_over, self.has_hop) = (false, true);
             }
