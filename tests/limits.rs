@@ -18,7 +18,7 @@ const HALF: f64 = std::f64::consts::FRAC_1_SQRT_2;
 const QUARTER: [[f64; 3]; 3] = [[1.0, 0.0, 1.0], [1.0, 1.0, HALF], [0.0, 1.0, 1.0]];
 
 /// A plane job, whose surface is still to be set.
-fn plane() -> Job {
+pub(crate) fn plane() -> Job {
     job_file::parse(
         "plane",
         "[surface]\nkind = \"nurbs\"\ndegree = [1, 1]\nknots_u = [0, 0, 1, 1]\nknots_v = [0, 0, 1, 1]\n\

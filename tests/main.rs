@@ -44,6 +44,7 @@ mod script;
 mod sequences;
 mod session;
 mod settings;
+mod short_patches;
 mod small_edges;
 mod spindle;
 mod standing;

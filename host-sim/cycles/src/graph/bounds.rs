@@ -446,6 +446,12 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "pieces of the planning of a period: PIECES_MAX",
     ),
     (
+        "interp_core::sequence::lookahead::short_patch::slow_down",
+        24,
+        "stations that a short patch slows down: STATIONS_SLOW",
+    ),
+    ("interp_core::sequence::lookahead::short_patch::slow", 3, "axes"),
+    (
         "interp_core::pass::front::advance::measuring::has_crest",
         16,
         "places that are passed over: CHUNK",

@@ -4,6 +4,7 @@
 //! Stations depend on the surface, not on the samples, so holds and overrides do not change the passes.
 
 mod pass_plan;
+mod short_patch;
 mod stations;
 mod stretch;
 mod turn_search;
@@ -25,6 +26,7 @@ use crate::sample::{SpanParameter, interval_of};
 use crate::surface::PathSpeed;
 use pass_plan::PIECE_WORDS;
 pub(crate) use pass_plan::PassPlan;
+use short_patch::ShortPatch;
 use within::WholePass;
 
 /// Length of a cell between kept stations that is short enough, mm.
@@ -49,6 +51,8 @@ enum Task {
     Derivatives(u8, u8),
     /// Run the step-over estimator, with this number of evaluations left at the station.
     Estimate(u8),
+    /// Slow the pass down over a short patch.
+    SlowDown,
     Close,
     /// Seek the next pass of a region.
     Seek,
@@ -76,6 +80,7 @@ mod cycles {
     pub(super) const EXTEND: u32 = 3_500;
     pub(super) const FRONT_STATION: u32 = 4_800;
     pub(super) const DERIVATIVES: u32 = 3_400;
+    pub(super) const SLOW_DOWN: u32 = 5_000;
     pub(super) const CLOSE: u32 = 1_700;
     pub(super) const HALF: u32 = 1_500;
     pub(super) const BOUND: u32 = 5_000;
@@ -138,6 +143,7 @@ pub(crate) struct Lookahead {
     is_smooth: bool,
     speed: PathSpeed,
     window: Window,
+    short: ShortPatch,
     /// The inverse limits of acceleration and jerk, and the inverse square and cube of the feed; the place before the window's, if it is not kept; the greatest
     /// derivatives for which there is no room, for the next station.
     per_limit: [[f32; 2]; 3],
@@ -200,6 +206,7 @@ impl Lookahead {
         is_smooth: false,
         speed: PathSpeed::STILL,
         window: Window::EMPTY,
+        short: ShortPatch::NONE,
         per_limit: [[0.0; 2]; 3],
         slowest: [0.0; 2],
         most: 0,
@@ -247,6 +254,7 @@ impl Lookahead {
             Task::Estimate(1..) if estimator.is_some_and(makes_patch) => cycles::PATCH,
             Task::Estimate(0) => cycles::NEXT,
             Task::Estimate(_) => cycles::ESTIMATE,
+            Task::SlowDown => cycles::SLOW_DOWN,
             Task::Close => cycles::CLOSE,
             Task::Seek => lines::PORTION_CYCLES,
             Task::Across => cycles::PATCH,
@@ -282,6 +290,7 @@ impl Lookahead {
         out.route = route;
         out.set_cells(0);
         (self.centre_mm, self.bends, self.jumps) = (0.0, false, false);
+        self.short = ShortPatch::NONE;
         (out.point, out.is_tip) = (false, false);
         out.full_pace = 1.0;
         out.next = None;
@@ -337,6 +346,10 @@ impl Lookahead {
                     estimator.work(job, &self.piece.position, &self.patch, fraction, most);
                 }
                 Task::Estimate(looks - 1)
+            }
+            Task::SlowDown => {
+                self.slow_down(job, out)?;
+                self.next_patch(job, out)
             }
             Task::Close => self.close_pass(job, axes, estimator, lines, out)?,
             Task::Seek => self.seek_next(job, axes, estimator.as_deref(), lines, out)?,
@@ -494,6 +507,14 @@ impl Lookahead {
         if let Some(again) = self.looks_finer(out) {
             return again;
         }
+        if self.slows_down(job, out) {
+            Task::SlowDown
+        } else {
+            self.next_patch(job, out)
+        }
+    }
+
+    fn next_patch(&mut self, job: &Job<'_>, out: &PassPlan) -> Task {
         self.start_q10 += to_q10(self.arc_mm);
         let next = if self.is_on_front() {
             self.after
