@@ -89,10 +89,18 @@ impl RowHistory {
         row.saturating_add(header.window).saturating_sub(1)
     }
 
-    /// Whether a pass in this row, after the one that was entered, lies outside its window: in another cell of a region, or beyond a gap.
-    pub(crate) const fn jumps(&self, header: &Header, row: u16) -> bool {
-        let [own, ..] = self.rows;
-        row < own || row >= own.saturating_add(header.window)
+    /// Whether a pass in this row, after the one that was entered, lies outside its window: in another cell of a region, or beyond a gap. In the last row of a window
+    /// that begins with the pass that was entered there would be no place for the pass after it.
+    pub(crate) fn jumps(&self, header: &Header, row: u16) -> bool {
+        let [own, before, _] = self.rows;
+        let end = match FirstRow::of(header) {
+            FirstRow::Own | FirstRow::Before => own.saturating_add(header.window),
+            FirstRow::Left | FirstRow::Turned => {
+                let end = before.saturating_add(header.window);
+                end.min(Self::last_from(own, header))
+            }
+        };
+        row < own || row >= end
     }
 
     /// Side spans that the planning of the pass may look at, from the first one.
@@ -211,6 +219,65 @@ impl RowHistory {
             before: own,
             own: side.span,
             last,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Header, Pattern, RowHistory};
+    use crate::job::AxisLimits;
+    use crate::sample::SpanParameter;
+
+    const ROWS: u16 = 400;
+
+    /// Passes by steps of up to two rows, and beginnings of other cells up to 60 rows away, in windows of 6 to 40 rows: each pass advances, and what is needed fits the window.
+    #[test]
+    fn passes_advance_in_any_row() {
+        let mut state = 1_u64;
+        let mut below = |end: u64| {
+            state ^= state << 13;
+            state ^= state >> 7;
+            state ^= state << 17;
+            state % end
+        };
+        for pattern in [Pattern::Zig, Pattern::Zigzag] {
+            for _ in 0..20_000 {
+                let header = Header {
+                    pattern,
+                    side_spans: ROWS,
+                    window: 6 + below(35) as u16,
+                    axes: Some(AxisLimits::default()),
+                    ..Header::default()
+                };
+                let mut rows = RowHistory::START;
+                let mut side = SpanParameter { span: 0, fraction: 0 };
+                for _ in 0..12 {
+                    rows.enter(&header, side.span, false);
+                    let step = below(2000) as f32 * 1e-3 + 0.01;
+                    let next = rows.next_side(&header, side, step, |_| 1.0).unwrap();
+                    assert!(next > side, "{rows:?} {header:?}: from {side:?} to {next:?}");
+                    side = if below(4) == 0 {
+                        SpanParameter {
+                            span: (side.span + below(60) as u16).min(ROWS - 1),
+                            fraction: below(u64::MAX) >> 32 << 32,
+                        }
+                    } else {
+                        next
+                    };
+                    let needed = rows.needed(&header, side, None, |_| 1.0);
+                    let from = needed.behind.unwrap_or(needed.own);
+                    let first = if rows.jumps(&header, side.span) {
+                        needed.own
+                    } else {
+                        from
+                    };
+                    assert!(needed.last < first + header.window, "{rows:?} {needed:?}");
+                    if side.span + 1 == ROWS {
+                        break;
+                    }
+                }
+            }
         }
     }
 }
