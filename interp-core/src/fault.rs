@@ -20,7 +20,7 @@ pub enum FaultKind {
     OutOfRange = 4,
     /// The job has more data than the store holds. Value: words asked for.
     TooManyPatches = 5,
-    /// One period's arc is longer than a whole patch. Value: the part of the arc beyond the patch, mm.
+    /// One period's arc is longer than a whole patch, or a straight pass within axis limits would creep over one. Value: the part of the arc beyond the patch, or its length, mm.
     PatchTooShort = 6,
     /// The path interval is too small to advance the side parameter. Value: the interval as a fraction of a patch.
     IntervalTooSmall = 7,

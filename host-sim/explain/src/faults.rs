@@ -58,10 +58,10 @@ fn words(kind: FaultKind) -> [&'static str; 5] {
             "A surface of 150 x 150 bicubic patches: three rows of 150 are 450 patches, where about 309 fit.",
         ],
         FaultKind::PatchTooShort => [
-            "The arc of one period is longer than a whole patch.",
-            "The rest of the arc beyond the patch, mm.",
+            "The arc of one period is longer than a whole patch; of a straight pass within axis limits, a patch between two others is shorter than 0.1 um.",
+            "The rest of the arc beyond the patch, or the length of the patch, mm.",
             "Knots are closer together than the arc of one period: 0.01 mm at 600 mm/min and 1 ms.",
-            "Lower the feed, or remove knots with such a small spacing.",
+            "Lower the feed, remove knots with such a small spacing, or give axis limits: within them a straight pass is slow over short patches.",
             "jobs/freeform.toml at `feed_mm_min = 600000` and `period_us = 2000`: 20 mm per period, longer than its patches.",
         ],
         FaultKind::IntervalTooSmall => [

@@ -20,11 +20,9 @@ pub(super) struct PictureTexts {
 }
 
 impl PictureTexts {
-    /// The texts of a run of this job. `job_name`: path of the job file; only the file name is shown.
+    /// The texts of a run of this job. `job_name`: path of the job file, `part.toml#5` for a face of a part's; only the file name and the face are shown.
     pub(super) fn new(job: &Job, record: &Record, job_name: &Path, findings: &SurveyResult) -> Self {
-        let title = job_name
-            .file_stem()
-            .map_or_else(|| "job".to_owned(), |name| name.to_string_lossy().into_owned());
+        let title = title_of(job_name);
         let along = parameter(job.along);
         let passes = findings.passes;
         let plural = if passes == 1 { "pass" } else { "passes" };
@@ -60,9 +58,43 @@ impl PictureTexts {
     }
 }
 
+/// The file's name without its ending, with the face of a part: "part, face 5" for `part.toml#5`.
+fn title_of(job_name: &Path) -> String {
+    let name = job_name
+        .file_name()
+        .map_or_else(|| "job".into(), |name| name.to_string_lossy());
+    let is_number = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
+    let face = name.rsplit_once('#').filter(|(_, face)| is_number(face));
+    let (file, face) = face.map_or((&*name, None), |(file, face)| (file, Some(face)));
+    let stem = file.rsplit_once('.').map_or(file, |(stem, _)| stem);
+    match face {
+        Some(face) => format!("{stem}, face {face}"),
+        None => stem.to_owned(),
+    }
+}
+
 fn parameter(along: Along) -> &'static str {
     match along {
         Along::U => "u",
         Along::V => "v",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::title_of;
+
+    #[test]
+    fn titles_tell_faces_of_a_part_apart() {
+        for (path, title) in [
+            ("parts/p.toml#5", "p, face 5"),
+            ("parts/p.toml", "p"),
+            ("a#b.toml", "a#b"),
+            ("no ending", "no ending"),
+        ] {
+            assert_eq!(title_of(Path::new(path)), title);
+        }
     }
 }

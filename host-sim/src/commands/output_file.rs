@@ -5,10 +5,12 @@
 
 use std::fs::{File, Metadata, Permissions};
 use std::io::{self, ErrorKind, Seek, Write};
+use std::os::fd::AsRawFd;
 use std::os::unix::fs::{MetadataExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
+use rustix::fs::{AtFlags, CWD, Mode, OFlags};
 use tempfile::{Builder, NamedTempFile, TempPath};
 
 use super::{Failure, Result, cannot_write};
@@ -118,6 +120,35 @@ fn beside(path: &Path) -> io::Result<NamedTempFile> {
         .tempfile_in(folder(path))
 }
 
+/// A new file without a name, in a folder; one that can be given a name where the file system has such.
+fn unnamed(folder: &Path) -> io::Result<File> {
+    let flags = OFlags::RDWR | OFlags::TMPFILE | OFlags::CLOEXEC;
+    match rustix::fs::open(folder, flags, Mode::from_raw_mode(NEW_FILE)) {
+        Ok(file) => Ok(file.into()),
+        Err(_) => tempfile::tempfile_in(folder),
+    }
+}
+
+/// Gives a file without a name one beside its target, at once.
+fn named_beside(file: &File, target: &Path) -> io::Result<TempPath> {
+    let open = format!("/proc/self/fd/{}", file.as_raw_fd());
+    let link = |path: &Path| {
+        let linked = rustix::fs::linkat(CWD, open.as_str(), CWD, path, AtFlags::SYMLINK_FOLLOW);
+        linked.map_err(io::Error::from)
+    };
+    let named = Builder::new().prefix(UNFINISHED).make_in(folder(target), link)?;
+    Ok(named.into_temp_path())
+}
+
+/// Copies a file into one beside its target.
+fn copied_beside(file: &mut File, target: &Path) -> io::Result<TempPath> {
+    let mut named = beside(target)?;
+    file.rewind()?;
+    io::copy(file, named.as_file_mut())?;
+    named.as_file().sync_all()?;
+    Ok(named.into_temp_path())
+}
+
 /// Writes a file.
 ///
 /// # Errors
@@ -151,7 +182,7 @@ impl OutputFile {
     /// As [`check`], or the file cannot be made.
     pub(super) fn begin(path: &Path, force: bool) -> Result<Self> {
         let (file, stream) = match target(path, force)? {
-            Target::File(target) => (tempfile::tempfile_in(folder(&target)), false),
+            Target::File(target) => (unnamed(folder(&target)), false),
             Target::Stream => (File::options().write(true).open(path), true),
         };
         Ok(Self {
@@ -184,13 +215,9 @@ impl OutputFile {
         let Target::File(target) = target(&self.path, self.force)? else {
             return Err(exists(&self.path));
         };
-        let mut named = beside(&target).map_err(failed)?;
-        self.file
-            .rewind()
-            .and_then(|()| io::copy(&mut self.file, named.as_file_mut()))
-            .and_then(|_| named.as_file().sync_all())
-            .map_err(failed)?;
-        rename(named.into_temp_path(), &target, self.force)
+        self.file.sync_all().map_err(failed)?;
+        let complete = named_beside(&self.file, &target).or_else(|_| copied_beside(&mut self.file, &target));
+        rename(complete.map_err(failed)?, &target, self.force)
     }
 }
 
