@@ -60,7 +60,15 @@ fn sheet(random: &mut Random) -> Job {
         knots_v,
         rational: false,
     });
-    job.machine.limits = Some(AxisLimits::DEFAULT);
+    // Positions of a nanometre tell a tenth of the jerk limit at 1 ms, not at 250 us.
+    let (share, period_us) = random.one_of(&[(1.0, 1000.0), (0.1, 1000.0), (3.0, 250.0), (1.0, 4000.0)]);
+    let limits = AxisLimits::DEFAULT;
+    job.machine.limits = Some(AxisLimits {
+        acceleration_mm_s2: limits.acceleration_mm_s2.map(|limit| share * limit),
+        jerk_mm_s3: limits.jerk_mm_s3.map(|limit| share * limit),
+        ..limits
+    });
+    job.machine.period_us = period_us;
     job.feed_mm_min = random.log_within(60.0, 6000.0);
     job.scallop_mm = 0.05;
     job
@@ -86,7 +94,7 @@ fn run(job: &Job, percent: u8) -> (Uses, Option<FaultKind>) {
     (uses, core.fault().map(|fault| fault.kind))
 }
 
-/// `SEEDS=600 TEST short_patches -- --nocapture`: the ball fits in 1 608 runs, of which 13 use more jerk.
+/// `SEEDS=600 TEST short_patches -- --nocapture`: the ball fits in 1 608 runs, of which 31 use more jerk.
 #[test]
 fn passes_are_slow_over_short_patches() {
     let seeds = std::env::var("SEEDS").map_or(40, |seeds| seeds.parse().unwrap());
@@ -102,7 +110,8 @@ fn passes_are_slow_over_short_patches() {
             );
             faults += u32::from(fault.is_some());
             if !uses.are_permitted() {
-                println!("{seed} F{:.0} {percent} %: {:?}", job.feed_mm_min, uses.worst);
+                let (feed, period_us) = (job.feed_mm_min, job.machine.period_us);
+                println!("{seed} F{feed:.0} {percent} % {period_us} us: {:?}", uses.worst);
                 above += 1;
             }
             for (worst, used) in worst.iter_mut().zip(uses.worst) {
@@ -112,6 +121,7 @@ fn passes_are_slow_over_short_patches() {
     }
     println!("{seeds} sheets, {faults} runs refused, {above} above, at most {worst:?}");
     assert!(faults < 3 * seeds as u32 / 4);
-    assert!(100 * above <= 3 * seeds, "{above} above");
+    // 3 % of the runs, where 2 % of a campaign are.
+    assert!(100 * above <= 9 * seeds, "{above} above");
     assert!(worst[1] <= PERMITTED[1], "acceleration {}", worst[1]);
 }
