@@ -1,8 +1,9 @@
 //! Within axis limits the tool's centre never jumps: not at a boundary that is a point with more than one normal, and not at a knot where the tangent plane
 //! jumps.
 
-use interp_core::FaultKind;
-use job::{AxisLimits, Job, Pattern, Spacing, Start};
+use integration_tests::sequences::{Core, loaded, period};
+use interp_core::{Command, Fault, FaultKind, Inputs, State};
+use job::{Along, AxisLimits, Job, NurbsSpec, Pattern, Side, Spacing, Start, SurfaceSpec};
 use machine::Machine;
 use machine::prepare::prepare;
 
@@ -58,4 +59,114 @@ fn the_centre_never_jumps() {
         ended > 40 && at_creases > 3,
         "{ended} ended, {at_creases} stopped"
     );
+}
+
+fn sample_job(name: &str) -> Job {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../jobs/{name}.toml"));
+    job_file::load(&path).unwrap()
+}
+
+/// A pass on a boundary that is a point: the tool stands there for some periods, on which every command ends at once, and a hold can be resumed.
+#[test]
+fn commands_on_a_pass_that_is_a_point() {
+    for (pattern, spacing) in [
+        (Pattern::Zig, Spacing::Exact),
+        (Pattern::Zigzag, Spacing::Exact),
+        (Pattern::Zigzag, Spacing::Constant(Start::Edge)),
+    ] {
+        let mut job = sample_job("sphere_cap");
+        job.machine.limits = Some(AxisLimits::DEFAULT);
+        (job.along, job.scallop_mm, job.pattern, job.spacing) = (Along::V, 0.05, pattern, spacing);
+        let prepared = prepare(&job).unwrap();
+        let mut core = loaded(&prepared.header, &prepared.words);
+        let mut sample = period(&mut core, Command::Start);
+        while sample.state != State::Running {
+            sample = period(&mut core, None);
+        }
+        let mut periods = 0;
+        while sample.state == State::Running && sample.pass == 0 {
+            for command in [Command::Hold, Command::Pause, Command::Stop, Command::Abort] {
+                let mut core = core.clone();
+                let at = format!("{pattern:?} {spacing:?}: {command:?} in period {periods}");
+                let rests = runs_until(&mut core, command, &[State::Held, State::Ready], 2000);
+                assert!(rests, "{at}: {:?}", core.state());
+                if matches!(command, Command::Hold | Command::Pause) {
+                    assert!(
+                        runs_until(&mut core, Command::Resume, &[State::Finished], 200_000),
+                        "{at}"
+                    );
+                }
+            }
+            let mut stopped = core.clone();
+            stopped.controlled_stop(Fault::new(FaultKind::DeadlineMissed, 1.0));
+            assert!(
+                runs_until(&mut stopped, None, &[State::Faulted], 2),
+                "period {periods}"
+            );
+            sample = period(&mut core, None);
+            periods += 1;
+        }
+        println!("{pattern:?} {spacing:?}: {periods} periods");
+        assert!(periods > 0);
+    }
+}
+
+/// Whether a core is in one of the states within so many periods of a command.
+fn runs_until(core: &mut Core, command: impl Into<Inputs>, states: &[State], most: u32) -> bool {
+    let mut sample = period(core, command);
+    for _ in 0..most {
+        if states.contains(&sample.state) {
+            return true;
+        }
+        sample = period(core, None);
+    }
+    false
+}
+
+/// Where the surface does not face up a stop leaves the tool where it comes to rest, also on its way from one pass to the next: the material is above it.
+#[test]
+fn a_stop_below_an_overhang_stays() {
+    // Passes over a third of a cylinder of 20 mm: from its top to 30 degrees below its side.
+    let half = std::f64::consts::FRAC_PI_3;
+    let arc = [0.0, half, 2.0 * half].map(|angle| {
+        let weight = if angle == half { half.cos() } else { 1.0 };
+        [20.0 * angle.sin() / weight, 20.0 * angle.cos() / weight, weight]
+    });
+    let poles_mm = arc.map(|[x, z, weight]| vec![[x, 0.0, z, weight], [x, 30.0, z, weight]]);
+    let mut job = sample_job("sphere_cap");
+    job.surface = SurfaceSpec::Nurbs(NurbsSpec {
+        degree: [2, 1],
+        knots_u: vec![0.0, 0.0, 0.0, 1.0, 1.0, 1.0],
+        knots_v: vec![0.0, 0.0, 1.0, 1.0],
+        poles_mm: poles_mm.to_vec(),
+        rational: true,
+    });
+    job.machine.limits = Some(AxisLimits::DEFAULT);
+    (job.side, job.pattern, job.scallop_mm) = (Side::Plus, Pattern::Zigzag, 0.2);
+    let prepared = prepare(&job).unwrap();
+    let mut core = loaded(&prepared.header, &prepared.words);
+    let mut sample = period(&mut core, Command::Start);
+    while sample.state != State::Running {
+        sample = period(&mut core, None);
+        assert!(sample.state != State::Faulted, "{:?}", core.fault());
+    }
+    while sample.pass == 0 && sample.state == State::Running {
+        sample = period(&mut core, None);
+    }
+    let lowest = sample.cl_nm[2];
+    let mut periods = 0;
+    while sample.state == State::Linking {
+        let mut stopped = core.clone();
+        assert!(runs_until(
+            &mut stopped,
+            Command::Stop,
+            &[State::Ready, State::Finished],
+            2000
+        ));
+        let rise_nm = stopped.last().cl_nm[2] - lowest;
+        assert!(rise_nm.abs() < 1000, "period {periods}: {rise_nm} nm");
+        sample = period(&mut core, None);
+        periods += 1;
+    }
+    assert!(periods > 10, "{periods} periods to the next pass");
 }

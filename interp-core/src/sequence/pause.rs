@@ -33,12 +33,8 @@ impl Sequencer {
 
     /// Retracts from rest to the safe height, to wait there. False where the tool stays: the surface does not face up, or nothing is under way.
     pub(crate) fn lift(&mut self, run: &Run) -> bool {
-        let is_on_surface = match self.phase {
-            Phase::Pass | Phase::StepOver => true,
-            Phase::Await => self.on_surface,
-            _ => false,
-        };
-        let stays = matches!(self.phase, Phase::Lifted | Phase::Done) || (is_on_surface && !run.faces_up());
+        let stays =
+            matches!(self.phase, Phase::Lifted | Phase::Done) || (self.is_in_contact() && !run.faces_up());
         let Some(at) = self.at.filter(|_| !stays) else {
             return false;
         };

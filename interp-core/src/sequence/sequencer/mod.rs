@@ -260,6 +260,8 @@ impl Sequencer {
         }
         self.lookahead.restart();
         self.forget_step();
+        self.has_hop = false;
+        self.hop.clear();
         self.feed_factor = 1.0;
         (self.front_spent, self.front_last) = (0, 0);
         self.spent_last = 0;
@@ -283,6 +285,8 @@ impl Sequencer {
     /// Whether the tool is at rest, and stays so while the commanded speed is 0.
     pub(crate) fn is_at_rest(&self) -> bool {
         match self.phase {
+            // The tool stands on a pass that is a point, whatever the pace.
+            Phase::Pass if self.plans_ref().0.point => true,
             Phase::Pass | Phase::Turn => self.pace.is_at_rest(),
             Phase::StepOver => self.step_over.progress.is_at_rest(),
             Phase::Leg(_) => self.straight.progress.is_at_rest(),
@@ -333,6 +337,15 @@ impl Sequencer {
         !matches!(self.phase, Phase::Pass)
     }
 
+    /// Whether the tool is on the surface, on a pass or between two.
+    pub(in crate::sequence) const fn is_in_contact(&self) -> bool {
+        match self.phase {
+            Phase::Pass | Phase::StepOver => true,
+            Phase::Await => self.on_surface,
+            _ => false,
+        }
+    }
+
     /// Pass, path and side parameter of the fault of the next pass, if it stopped the run.
     pub(crate) fn fault_position(&self) -> Option<(u32, SpanParameter, SpanParameter)> {
         let [one, other] = &self.plans;
@@ -342,7 +355,7 @@ impl Sequencer {
 
     /// Retracts from rest to the safe height and ends there. Where the surface does not face up the tool stays.
     pub(crate) fn retract(&mut self, run: &Run) {
-        let is_free = self.is_link() || run.faces_up();
+        let is_free = !self.is_in_contact() || run.faces_up();
         self.goal = Goal::SafeHeight;
         self.is_low = false;
         if is_free {
