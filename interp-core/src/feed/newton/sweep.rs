@@ -49,10 +49,13 @@ impl Sweep {
         Some(slope * plan.inverse_step)
     }
 
-    /// Whether there is a jump behind the node.
-    pub(crate) fn has_jump(&self, plan: &Plan) -> bool {
-        plan.knot(self.knot)
-            .is_some_and(|knot| knot.interval == self.node)
+    /// Jumps behind the node.
+    pub(crate) fn jumps(&self, plan: &Plan) -> u16 {
+        let mut knot = self.knot;
+        while plan.knot(knot).is_some_and(|knot| knot.interval == self.node) {
+            knot += 1;
+        }
+        knot - self.knot
     }
 
     /// Moves to the next node; whether there is none.

@@ -8,9 +8,11 @@ const FACTOR: u32 = 3_000;
 const ASSEMBLE: u32 = 3_950;
 const SOLVE: u32 = 22_500;
 const REACH: u32 = 2_600;
-/// On top of the others, for a jump behind the node.
+/// On top of the others, for each jump behind the node.
 const JUMP: u32 = 3_500;
 const CHECK: u32 = 1_900;
+/// On top of that where the path has jumps.
+const CHECK_JUMPS: u32 = 200;
 const GATE: u32 = 2_950;
 const GATE_PLACE: u32 = 22_000;
 /// [`Stage::Scale`] of a plan with a turn.
@@ -23,7 +25,7 @@ const LIST_LEAST: u32 = 2_000;
 impl Planner {
     /// Cycles of the next piece of work.
     pub(crate) fn cycles(&self, plan: &Plan) -> u32 {
-        let jump = if self.sweep.has_jump(plan) { JUMP } else { 0 };
+        let jumps = || JUMP * u32::from(self.sweep.jumps(plan));
         let nodes = if plan.has_turn() {
             NODES_COUNT
         } else {
@@ -33,10 +35,11 @@ impl Planner {
             |cycles: u32| LIST_LEAST + (cycles - LIST_LEAST) * u32::from(nodes) / u32::from(NODES_COUNT);
         match self.stage {
             Stage::Walk => self.walker.cycles(plan),
-            Stage::Factor | Stage::Relax => FACTOR + jump,
-            Stage::Assemble => ASSEMBLE + jump,
+            Stage::Factor | Stage::Relax => FACTOR + jumps(),
+            Stage::Assemble => ASSEMBLE + jumps(),
             Stage::Solve => of_nodes(SOLVE),
-            Stage::Reach => REACH + jump,
+            Stage::Reach => REACH + jumps(),
+            Stage::Check if plan.knot_count > 0 => CHECK + CHECK_JUMPS,
             Stage::Check => CHECK,
             Stage::Scale if plan.has_turn() => BLEND,
             Stage::Weigh | Stage::Scale | Stage::Take | Stage::Finish => of_nodes(LIST),

@@ -27,7 +27,10 @@ const JUMPS_A_PORTION: u16 = 6;
 const CELLS_A_PORTION: u16 = 84;
 const NODES_A_PORTION: u16 = 60;
 const PLACES_A_PORTION: u16 = 50;
+const BUSY_A_PORTION: u16 = 56;
 const KNOTS_A_PORTION: u16 = 40;
+/// Jumps in the intervals of a portion, but for those of the last one.
+const KNOTS_FOUND: u16 = 10;
 
 /// Cycles of a portion with no item.
 const PORTION_LEAST: u32 = 1_500;
@@ -78,8 +81,11 @@ pub(crate) struct Walker {
     jerk: f32,
     /// Greatest acceleration, mm/s^2.
     acceleration: f32,
-    /// Greatest speed, mm/s.
+    /// Greatest speed, mm/s, and the square of the walk's.
     speed: f32,
+    top: f32,
+    /// Jumps among the stations.
+    jumps: u16,
     /// Duration of the acceleration-limited motion, s.
     duration: f32,
     /// Length of the moving average, s.
@@ -130,6 +136,8 @@ impl Walker {
         jerk: 0.0,
         acceleration: 0.0,
         speed: 0.0,
+        top: 0.0,
+        jumps: 0,
         duration: 0.0,
         mean_s: 0.0,
         intervals: 0,
@@ -176,9 +184,10 @@ impl Walker {
         // Cycles in proportion to the number of items, from those of a full portion.
         let (cycles, [count, most]) = match self.stage {
             Stage::Caps => (18_100, [left(stations, STATIONS_A_PORTION), STATIONS_A_PORTION]),
-            Stage::Jumps => (12_000, [JUMPS_A_PORTION, JUMPS_A_PORTION]),
+            Stage::Jumps => (20_000, [self.jumps, JUMPS_A_PORTION]),
             Stage::Rests => (12_000, [stations, STATIONS]),
-            Stage::Backwards | Stage::Busy => (25_000, [stations, STATIONS]),
+            Stage::Backwards => (25_000, [stations, STATIONS]),
+            Stage::Busy => (14_000, [left(stations, BUSY_A_PORTION), BUSY_A_PORTION]),
             Stage::Flatten => (17_000, [stations, STATIONS]),
             Stage::Forwards => (17_000, [left(stations, CELLS_A_PORTION), CELLS_A_PORTION]),
             Stage::TryEven | Stage::TryGrowing | Stage::Coarsen | Stage::Bisect(_) | Stage::Times => (
@@ -194,6 +203,7 @@ impl Walker {
                 15_000,
                 [left(self.intervals + 1, PLACES_A_PORTION), PLACES_A_PORTION],
             ),
+            Stage::Knots if self.jumps > 0 => (18_000, [KNOTS_A_PORTION, KNOTS_A_PORTION]),
             Stage::Knots => (10_500, [left(self.intervals, KNOTS_A_PORTION), KNOTS_A_PORTION]),
             Stage::Done => return 0,
         };
@@ -227,10 +237,7 @@ impl Walker {
                 self.rest_at_jumps(lists, plan);
                 Stage::Busy
             }
-            Stage::Busy => {
-                self.find_busy(lists, plan, limits);
-                Stage::TryEven
-            }
+            Stage::Busy => self.busy_cells(lists, plan, limits),
             Stage::TryEven => self.try_even(lists),
             Stage::TryGrowing => self.try_growing(lists),
             Stage::Coarsen => self.coarsen(lists),
@@ -261,8 +268,22 @@ impl Walker {
                 1.0
             };
             self.cap(lists, station, q, limits, share);
+            self.jumps += u16::from(plan.stations.is_jump(station));
         }
-        self.next(end, end == count, Stage::Caps, Stage::Jumps)
+        let next = if self.jumps > 0 {
+            Stage::Jumps
+        } else {
+            self.after_jumps()
+        };
+        self.next(end, end == count, Stage::Caps, next)
+    }
+
+    fn after_jumps(&self) -> Stage {
+        if self.is_from_rest_to_rest() {
+            Stage::Backwards
+        } else {
+            Stage::Flatten
+        }
     }
 
     fn slow_at_jumps(&mut self, lists: &mut Lists, plan: &Plan, limits: &MotionLimits) -> Stage {
@@ -276,12 +297,7 @@ impl Walker {
             }
             station += 1;
         }
-        let next = if self.is_from_rest_to_rest() {
-            Stage::Backwards
-        } else {
-            Stage::Flatten
-        };
-        self.next(station, station >= count, Stage::Jumps, next)
+        self.next(station, station >= count, Stage::Jumps, self.after_jumps())
     }
 
     fn go_forwards(
@@ -299,6 +315,19 @@ impl Walker {
             self.choose_intervals(limits, deadlines);
         }
         self.next(end, end == last, Stage::Forwards, Stage::Rests)
+    }
+
+    fn busy_cells(&mut self, lists: &mut Lists, plan: &Plan, limits: &MotionLimits) -> Stage {
+        let last = plan.stations.count().saturating_sub(1);
+        let end = last.min(self.index + BUSY_A_PORTION);
+        if self.index == 0 {
+            self.begin_busy(lists, last);
+        }
+        self.find_busy(lists, plan, limits, self.index..end);
+        if end == last {
+            self.add_busy(lists, self.duration);
+        }
+        self.next(end, end == last, Stage::Busy, Stage::TryEven)
     }
 
     /// The usual spacing, s: not below the finest.
@@ -399,9 +428,14 @@ impl Walker {
     }
 
     fn find_knots(&mut self, plan: &mut Plan, limits: &MotionLimits) -> Stage {
-        let end = plan.intervals.min(self.index + KNOTS_A_PORTION);
-        for interval in self.index..end {
+        let most = plan.knot_count.saturating_add(KNOTS_FOUND);
+        let mut end = self.index;
+        for interval in self.index..plan.intervals.min(self.index + KNOTS_A_PORTION) {
+            if plan.knot_count >= most {
+                break;
+            }
             find_knots(plan, interval, limits);
+            end = interval + 1;
         }
         self.next(end, end == plan.intervals, Stage::Knots, Stage::Done)
     }

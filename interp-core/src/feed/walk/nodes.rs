@@ -1,5 +1,7 @@
 //! The number of nodes and their times: close together where the speed changes.
 
+use core::ops::Range;
+
 use super::{ACCEL, BUSY, NODES, SPACING, SPEED_SQR, TIME, Vary, Walker};
 use crate::feed::deadlines::Deadlines;
 use crate::feed::limits::MotionLimits;
@@ -96,32 +98,43 @@ impl Walker {
             .at_least(time / (4000.0 * f32::from(self.intervals)));
     }
 
-    /// Times at which something happens.
-    pub(super) fn find_busy(&mut self, lists: &mut Lists, plan: &Plan, limits: &MotionLimits) {
-        let last = plan.stations.count().saturating_sub(1);
-        let mut top = 0.0;
+    /// The greatest speed of the walk; the start is busy.
+    pub(super) fn begin_busy(&mut self, lists: &mut Lists, last: u16) {
+        self.top = 0.0;
         for station in 0..=last {
-            top = get(lists, SPEED_SQR, station).at_least(top);
+            self.top = get(lists, SPEED_SQR, station).at_least(self.top);
         }
-        put(lists, BUSY, 0, 0.0);
-        self.busy = 1;
-        for cell in 0..last {
+        self.busy = 0;
+        self.add_busy(lists, 0.0);
+    }
+
+    pub(super) fn add_busy(&mut self, lists: &mut Lists, time: f32) {
+        put(lists, BUSY, self.busy, time);
+        self.busy += 1;
+    }
+
+    /// Times at which something happens in these cells.
+    pub(super) fn find_busy(
+        &mut self,
+        lists: &mut Lists,
+        plan: &Plan,
+        limits: &MotionLimits,
+        cells: Range<u16>,
+    ) {
+        for cell in cells {
             let is_busy = if plan.stations.is_jump(cell) {
                 limits.jump_speed(&plan.stations.jump(cell)) < 1.5 * limits.feed
             } else {
                 let change = get(lists, SPEED_SQR, cell + 1) - get(lists, SPEED_SQR, cell);
                 let is_capped = get(lists, ACCEL, cell) < 0.0 || get(lists, ACCEL, cell + 1) < 0.0;
-                change.abs() >= 1e-3 * top || is_capped
+                change.abs() >= 1e-3 * self.top || is_capped
             };
             if is_busy {
                 let middle = 0.5 * (get(lists, TIME, cell) + get(lists, TIME, cell + 1));
                 let rests = self.rests_in(lists, plan, cell);
-                put(lists, BUSY, self.busy, if rests { -middle } else { middle });
-                self.busy += 1;
+                self.add_busy(lists, if rests { -middle } else { middle });
             }
         }
-        put(lists, BUSY, self.busy, self.duration);
-        self.busy += 1;
     }
 
     /// Spacing and growth for a value of what is varied.

@@ -32,16 +32,15 @@ impl ShortPatch {
 
 impl Lookahead {
     /// Whether the patch that is looked at is between two others and shorter than the way of a period at the greatest override.
-    fn is_short_patch(&self, job: &Job<'_>, is_last: bool) -> bool {
+    fn is_short_patch(&self, job: &Job<'_>, out: &PassPlan) -> bool {
         let most = OVERRIDE_MAX * job.header.feed_mm_s * job.header.period_s;
-        self.patches > 0 && !is_last && self.arc_mm < most
+        self.patches > 0 && self.arc_mm < most && out.route.next(job, &self.piece).is_some()
     }
 
     /// Whether the pass is slowed down at stations of the patch that is looked at: it is short, or near a short one before it.
     pub(super) fn slows_down(&self, job: &Job<'_>, out: &PassPlan) -> bool {
-        let is_last = out.route.next(job, &self.piece).is_none();
         let is_near = self.arc_nm(0.0) < self.short.until_nm;
-        !self.is_on_front() && !out.point && (is_near || self.is_short_patch(job, is_last))
+        !self.is_on_front() && !out.point && (is_near || self.is_short_patch(job, out))
     }
 
     /// Slows the pass down at the stations of the patch, and at those before it that are near.
@@ -50,9 +49,8 @@ impl Lookahead {
     /// [`FaultKind::PatchTooShort`] with its length, mm, where the pass would creep over the patch.
     pub(super) fn slow_down(&mut self, job: &Job<'_>, out: &mut PassPlan) -> Result<()> {
         let [start_nm, end_nm] = [0.0, self.arc_mm].map(|arc| self.arc_nm(arc));
-        let is_last = out.route.next(job, &self.piece).is_none();
         let (mut length_mm, mut reach_nm) = (f32::MAX, 0);
-        if self.is_short_patch(job, is_last) {
+        if self.is_short_patch(job, out) {
             length_mm = self.arc_mm;
             if length_mm < PATCH_MIN_MM {
                 return Err(Fault::new(FaultKind::PatchTooShort, length_mm));
