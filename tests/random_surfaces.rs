@@ -312,3 +312,38 @@ fn patches_smaller_than_the_ball() {
         }
     }
 }
+
+/// Within axis limits the look-ahead takes the paper's interval from its stations, and from the pass between them where that is greater there. `SEEDS=1000` for more surfaces.
+#[test]
+fn the_papers_steps_within_axis_limits() {
+    let seeds = std::env::var("SEEDS").map_or(40, |seeds| seeds.parse().unwrap());
+    let (mut worst, mut surfaces) = ((0.0_f64, 0), 0);
+    for seed in 0..seeds {
+        let mut job = bumpy_job(seed);
+        job.spacing = Spacing::FirstOrder;
+        job.scallop_mm = 0.05;
+        job.feed_mm_min = [300.0, 1200.0, 6000.0][seed % 3];
+        job.machine.limits =
+            job::AxisLimits::of_given(Some([100.0; 3]), Some([1000.0; 3]), Some([20_000.0; 3]));
+        let Ok(oracle) = Oracle::new(&job) else { continue };
+        let prepared = prepare(&job).unwrap();
+        let mut survey = Survey::new(&oracle, None);
+        let mut machine = Machine::load(&prepared).unwrap();
+        let result = machine.run(|sample| {
+            survey
+                .add(&inspect::plain(&prepared, sample), &mut |_, _| ())
+                .is_ok()
+        });
+        if result.is_err() {
+            continue;
+        }
+        let report = survey.finish(true, &mut |_, _| ()).unwrap().report;
+        surfaces += 1;
+        if report.side_step.max > worst.0 {
+            worst = (report.side_step.max, seed);
+            println!("surface {seed}: a step is {:.2e} of its interval off", worst.0);
+        }
+    }
+    assert!(surfaces >= seeds / 4, "{surfaces} surfaces of {seeds}");
+    assert!(worst.0 <= 1e-5, "{worst:?} of {surfaces} surfaces");
+}

@@ -3,6 +3,7 @@
 //!
 //! Stations depend on the surface, not on the samples, so holds and overrides do not change the passes.
 
+mod maximum;
 mod pass_plan;
 mod short_patch;
 mod stations;
@@ -24,6 +25,7 @@ use crate::pass::schedule;
 use crate::pass::step_over::{PassMaximum, StepOverEstimator};
 use crate::sample::{SpanParameter, interval_of};
 use crate::surface::PathSpeed;
+use maximum::LastPlaces;
 use pass_plan::PIECE_WORDS;
 pub(crate) use pass_plan::PassPlan;
 use short_patch::ShortPatch;
@@ -34,7 +36,7 @@ const CELL_KEPT_MM: f32 = 0.3;
 /// Most stations of a pass, and most patches of which both ends are kept.
 const STATIONS: u16 = 168;
 const PATCHES: u16 = STATIONS / 2;
-/// Least length of a stretch of a pass on a front, mm, and of one that ends at a knot; shorter ones have no derivatives of their own.
+/// Least length of a stretch of a pass on a front that does not end at a knot, mm.
 const STRETCH_MIN_MM: f32 = 0.6;
 const _: () = assert!(STATIONS as usize == STATIONS_MAX);
 /// Most patches of a pass with turns: both ends of each are kept.
@@ -47,6 +49,8 @@ enum Task {
     /// Lengthen the stretch of a pass on a front by a piece, or end it.
     Extend,
     Station,
+    /// Evaluate the pass where its interval is least between the stations, so often.
+    Maximum(u8),
     /// Compute the derivatives at one of the last stations, by its place in the window, up to another.
     Derivatives(u8, u8),
     /// Run the step-over estimator, with this number of evaluations left at the station.
@@ -156,6 +160,7 @@ pub(crate) struct Lookahead {
     arc_mm: f32,
     start_q10: i64,
     maximum: PassMaximum,
+    last_places: LastPlaces,
     /// Side parameter of the pass, and whether the pass before is on the same line.
     line: Option<SpanParameter>,
     goes_on: bool,
@@ -215,6 +220,7 @@ impl Lookahead {
         arc_mm: 0.0,
         start_q10: 0,
         maximum: PassMaximum::NONE,
+        last_places: LastPlaces::NONE,
         line: None,
         goes_on: false,
         turn: Turn::NONE,
@@ -249,7 +255,7 @@ impl Lookahead {
             Task::Extend => cycles::EXTEND,
             Task::Station if self.is_on_front() && self.is_beyond_piece() => cycles::PIECE,
             Task::Station if self.is_on_front() => cycles::FRONT_STATION,
-            Task::Station => cycles::STATION,
+            Task::Station | Task::Maximum(_) => cycles::STATION,
             Task::Derivatives(..) => cycles::DERIVATIVES,
             Task::Estimate(1..) if estimator.is_some_and(makes_patch) => cycles::PATCH,
             Task::Estimate(0) => cycles::NEXT,
@@ -328,7 +334,18 @@ impl Lookahead {
             }
             Task::Station => {
                 self.visit(job, axes, estimator.as_deref_mut(), out)?;
-                self.after_station(job, estimator.as_deref(), out)
+                if self.has_maximum(job) {
+                    Task::Maximum(maximum::EVALUATIONS)
+                } else {
+                    self.after_station(job, estimator.as_deref(), out)
+                }
+            }
+            Task::Maximum(left) => {
+                if self.see_maximum() && left > 1 {
+                    Task::Maximum(left - 1)
+                } else {
+                    self.after_station(job, estimator.as_deref(), out)
+                }
             }
             Task::Derivatives(at, last) => {
                 self.differentiate(at, out);
@@ -394,6 +411,7 @@ impl Lookahead {
         }
         self.patch.lay(job, &out.route, &self.piece)?;
         self.range = self.piece.range;
+        self.last_places = LastPlaces::NONE;
         if is_first {
             self.measure_by(job, axes);
         }

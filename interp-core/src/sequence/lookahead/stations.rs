@@ -10,7 +10,7 @@ use crate::job::program::Job;
 use crate::job::{AxisLimits, SurfaceKind};
 use crate::math::arith::{fraction_to_f32, sqrt, truncated};
 use crate::math::number::{Bounded, MM_PER_NM, nm_to_mm, to_f32};
-use crate::pass::step_over::{PassMaximum, StepOverEstimator};
+use crate::pass::step_over::StepOverEstimator;
 use crate::sequence::link::is_elsewhere;
 use crate::surface::{Contact, PathSpeed};
 
@@ -271,13 +271,7 @@ impl Lookahead {
         let (contact, located) = self.patch.evaluate(fraction)?;
         check_travel(axes, &located.cl_nm)?;
         check_height(axes, &located.cl_nm)?;
-        let inv_interval_sq = self.patch.interval.inv_interval_sq(&contact);
-        if inv_interval_sq > self.maximum.inv_interval_sq {
-            self.maximum = PassMaximum {
-                inv_interval_sq,
-                shape: [contact.across, contact.lateral_squared],
-            };
-        }
+        self.see(job, fraction, &contact);
         if let Some(estimator) = estimator {
             estimator.see(job, &self.patch, &contact, fraction);
         }
