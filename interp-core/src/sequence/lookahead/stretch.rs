@@ -13,10 +13,10 @@ use crate::math::number::{Bounded, MM_PER_NM, to_f32};
 use crate::pass::route::Piece;
 use crate::surface::PathSpeed;
 
+/// Length that a stretch leaves to the rest of its span, and the least of one that is looked at again, mm.
 const STRETCH_KNOT_MM: f32 = 0.3;
-const STRETCH_SHORT_MM: f32 = 0.2;
-/// The least with derivatives of its own at an end of the pass, mm.
-const STRETCH_END_MM: f32 = 0.02;
+/// The least with derivatives of its own, mm.
+const STRETCH_SHORT_MM: f32 = 0.02;
 
 /// Change of a second and of a third derivative of an axis from which on a station within a stretch is kept, as shares of what takes the axis to its limit. Error of a third
 /// derivative by rounded positions, times the third power of a cell's length, mm.
@@ -147,13 +147,13 @@ impl Lookahead {
         let share = power_of_two(-i32::from(self.halvings));
         let fine = whole(length / self.cell_mm).max(CELLS_FINE) << self.halvings;
         // Near a rest the tool is slow, and rounding does no harm.
-        let (short, least) = if self.patches == 0 || self.after.is_none() {
-            (STRETCH_END_MM, CELLS_FINE)
+        let least = if self.patches == 0 || self.after.is_none() {
+            CELLS_FINE
         } else {
-            (STRETCH_SHORT_MM, 2)
+            2
         };
         let most = whole(length / (CELL_MIN_MM * share)).max(least);
-        self.is_short = length < short;
+        self.is_short = length < STRETCH_SHORT_MM;
         self.looks = if self.is_short {
             1
         } else {
@@ -168,27 +168,31 @@ impl Lookahead {
         Task::Station
     }
 
-    /// Whether the stretch that ends with this piece has the length for differences, and leaves it to the rest of the span.
+    /// Whether the stretch ends with this piece: at a knot of the surface, where the path may bend; elsewhere it has the length for differences, and leaves it to the rest of
+    /// the span.
     fn is_long_enough(&self, last: &Piece, out: &PassPlan) -> bool {
         let [start, end] = self.range;
         let [_, pass_end] = out.route.ends;
         let span = last.position.span;
+        // Each span that is left takes a stretch.
+        let spans = span.abs_diff(pass_end.span) + 2;
+        let has_room = self.least_mm < f32::MAX
+            && self.patches + spans < PATCHES
+            && out.plan.stations.count() + 2 * spans < STATIONS;
+        if last.front.is_some_and(|front| front.is_at_knot()) {
+            return has_room;
+        }
         let span_end = if span == pass_end.span {
             out.route.turned(pass_end.fraction)
         } else {
             u64::MAX
         };
-        let at_knot = last.front.is_some_and(|front| front.is_at_knot());
-        let least = if at_knot || self.halvings > 0 {
+        let least = if self.halvings > 0 {
             self.least_mm.at_most(STRETCH_KNOT_MM)
         } else {
             self.least_mm
         };
-        // Each span that is left takes a stretch.
-        let spans = span.abs_diff(pass_end.span) + 2;
-        self.least_mm < f32::MAX
-            && self.patches + spans < PATCHES
-            && out.plan.stations.count() + 2 * spans < STATIONS
+        has_room
             && self.part_mm(end.saturating_sub(start)) >= least
             && self.part_mm(span_end.saturating_sub(end)) >= STRETCH_KNOT_MM
     }
