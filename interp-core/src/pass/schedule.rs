@@ -8,7 +8,7 @@ use crate::sample::SpanParameter;
 
 /// Maximum side span boundaries that an interval crosses, which bounds the loop. A longer interval
 /// ends on the last of them, closer than the scallop limit requires.
-const WALK_MAX: u16 = 16;
+pub(crate) const WALK_MAX: u16 = 16;
 
 /// The next pass's side parameter, `interval` (in units of the side parameter) beyond `from`, at most the end of the last span.
 /// Fractions are truncated to 2^-32, so that the reported parameter is the one that is used. `width` returns a span's

@@ -65,7 +65,7 @@ pub(crate) struct IsoLine {
 }
 
 /// The surface and the ball on it at one point of a pass, as used by the stages. "Per path" and "per side" mean per span fraction;
-/// g is the factor that a surface kind scales its derivatives by (1, or a part of the weight).
+/// g is the factor that a surface kind scales its derivatives by (1, or a quarter of the weight of a rational patch).
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Contact {
     /// Cutter contact relative to the patch's origin, units of 2^-shift nm.

@@ -151,18 +151,11 @@ pub(crate) fn extend(
 
 /// The step's derivatives at a node.
 fn direction(gradient: &[f32; LIST], node: u16, intervals: u16) -> Local {
-    let at = |index: usize| -gradient.get(index).copied().unwrap_or(0.0);
-    let index = usize::from(node);
-    let (here, next) = (at(index), at(index + 1));
-    let behind = at(index + 2) - 2.0 * next + here;
-    let before = match index.checked_sub(1) {
-        Some(previous) => at(previous) - 2.0 * here + next,
-        None => behind,
-    };
+    let Local { c, c1, c2 } = local(gradient, node, intervals);
     Local {
-        c: 0.5 * (here + next),
-        c1: next - here,
-        c2: [before, if node < intervals { behind } else { before }],
+        c: -c,
+        c1: -c1,
+        c2: c2.map(|side| -side),
     }
 }
 

@@ -149,7 +149,7 @@ impl CrestSearch {
         self.repeats = 0;
     }
 
-    /// An evaluation. Returns, after the last one, by how much the gap is too wide at the place for this share of the limit, units of the fronts; 0 where it is not.
+    /// An evaluation. Returns, after the last one, by how much the gap is too wide at the place for `margin` times the limit of the scallop height, units of the fronts; 0 where it is not.
     pub(crate) fn work<W: Deref<Target = [i32]>>(
         &mut self,
         tools: &mut Tools<'_, '_>,

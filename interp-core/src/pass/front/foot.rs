@@ -116,7 +116,7 @@ impl FootStep {
         to_units(self.half)
     }
 
-    /// An evaluation. `is_end`: the place is an end of the pass; `scale`: the scallop height is this share of the limit.
+    /// An evaluation. `is_end`: the place is an end of the pass; `margin`: the scallop height is this share of the limit.
     pub(crate) fn work<W: Deref<Target = [i32]>>(
         &mut self,
         tools: &mut Tools<'_, '_>,

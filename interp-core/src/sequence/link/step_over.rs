@@ -23,8 +23,8 @@ const BEND_SHARE: f32 = 0.5;
 /// Share of the jerk that it may take at most, so that something is left to move with.
 const BEND_JERK_SHARE: f32 = 0.6;
 
-/// Knots of a step-over that are looked at.
-const KNOTS_MAX: u16 = 4;
+/// Knots of a step-over that are looked at: a step crosses no more.
+const KNOTS_MAX: u16 = schedule::WALK_MAX;
 /// In a rise bounded by jerk alone, max(v a) is smaller than max(v) max(a) by this share: 1 - (2/3)^(3/2).
 const V_TIMES_A: f32 = 0.456;
 /// Share of the jerk that a jump of the direction may take in the periods that see it.

@@ -184,7 +184,7 @@ impl PassPlan {
     }
 
     /// The parameter that changes along the boundary that the pass ends on.
-    pub(crate) fn end_boundary(&self, _job: &Job<'_>) -> Along {
+    pub(crate) fn end_boundary(&self) -> Along {
         match self.route.front {
             Some(front) if front.are_on_boundary[1] => Along::Path,
             _ => Along::Side,
@@ -192,9 +192,9 @@ impl PassPlan {
     }
 
     /// Whether the next pass begins on the boundary that this one ends on, near that end.
-    pub(crate) fn is_beside(&self, next: &Self, job: &Job<'_>) -> bool {
+    pub(crate) fn is_beside(&self, next: &Self) -> bool {
         let (end, start) = (self.end(), next.start());
-        let is_on_it = match self.end_boundary(job) {
+        let is_on_it = match self.end_boundary() {
             Along::Path => start.side == end.side,
             Along::Side => start.path == end.path,
         };

@@ -321,7 +321,7 @@ impl Sequencer {
             };
             if let Some(start) = start {
                 let feed = job.header.feed_mm_s * self.feed_factor.at_least(1.0);
-                let way = (now.end_boundary(job), now.route.reversed);
+                let way = (now.end_boundary(), now.route.reversed);
                 self.step_over.begin(job, axes, way, [now.end(), start], feed);
             }
             return true;
@@ -522,7 +522,7 @@ impl Sequencer {
         let (now, next) = both(&mut self.plans, self.second);
         let may_step = job.header.edges == 0 || next.route.joins;
         let may_step = may_step && !now.is_tip && job.header.pattern == Pattern::Zigzag;
-        now.steps_over = may_step && now.is_beside(next, job);
+        now.steps_over = may_step && now.is_beside(next);
         if now.steps_over {
             self.step_over.request();
             self.has_step_over = true;
