@@ -3,7 +3,9 @@
 use controller::{in_process::Board, safety::DEBOUNCE_TICKS};
 use integration_tests::{HELLO, Host, MAKE_READY, dome, upload};
 use interp_core::{AxisLimits, Header, State, StepConfig};
-use protocol::message::{Configuration, InputLines, Reason, Reply, Report, Request, Status};
+use protocol::message::{
+    Activity, Configuration, InputLines, JogWay, Reason, Reply, Report, Request, Status,
+};
 
 const WORDS: usize = 64;
 /// Above the highest position of the ball centre on the dome, 25 mm.
@@ -332,6 +334,46 @@ fn where_no_home_is_required_the_axes_count_as_standing_at_the_jobs() {
     // A declared home is checked although none is required.
     desk.ask(Request::SetHome { home_nm: HOME_NM }).unwrap();
     assert_eq!(desk.start(), elsewhere(ELSEWHERE_NM, Some(HOME_NM)));
+}
+
+/// A jog after a run: the next jog, and the next run, begin where it has ended.
+#[test]
+fn where_no_home_is_required_a_jog_after_a_run_is_not_forgotten() {
+    let mut desk = Desk::new();
+    let mut profile = super::manual::profile();
+    (profile.travel_nm, profile.homing) = (None, None);
+    profile.configuration.homing_required = false;
+    (
+        profile.velocity_mm_s[2],
+        profile.acceleration_mm_s2,
+        profile.jerk_mm_s3,
+    ) = (100.0, [2000.0; 3], [50_000.0; 3]);
+    desk.ask(Request::SetProfile(Some(profile))).unwrap();
+    desk.ask(Request::Drives { on: true }).unwrap();
+    desk.load(within_limits(HOME_NM));
+    desk.start().unwrap();
+    desk.board.tick();
+    while desk.halted.is_none() {
+        desk.ticks(1);
+    }
+    let mut at = HOME_NM;
+    for _ in 0..2 {
+        let nm = [10_000_000, 0, 0];
+        let way = JogWay::By { nm };
+        desk.ask(Request::Jog {
+            way,
+            speed_mm_s: 100.0,
+        })
+        .unwrap();
+        while desk.board.real_time().motion().activity != Activity::Rest {
+            desk.ticks(1);
+        }
+        at[0] += nm[0];
+        assert_eq!(desk.board.real_time().motion().at_nm, at);
+        assert_eq!(desk.steps(), in_steps(at));
+    }
+    desk.running();
+    assert_eq!(desk.path.first(), Some(&at));
 }
 
 /// A job without limits has no links between passes, so the position of the axes is unknown after it.

@@ -162,7 +162,8 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         let at_nm = self.control.manual.at_nm();
         match change {
             Change::None => {
-                if self.control.safety.status().homed {
+                // Without a home too, once a run has placed the axes.
+                if self.control.safety.status().homed || self.interpolator.stands_nm().is_some() {
                     self.interpolator.stand_at(Some(at_nm));
                 }
             }
