@@ -250,6 +250,25 @@ fn a_job_is_loaded_again_after_a_change_of_the_profile() {
 }
 
 #[test]
+fn a_profile_with_more_steps_than_a_period_holds_is_refused() {
+    let mut desk = Desk::new(Board::new());
+    // Pulses of 3 slots, as long a pause after each: 166 steps in a period of 1 ms, and half a step for whole nanometres.
+    let with = |steps_per_mm: u32| {
+        let mut profile = profile();
+        let mut steps = StepConfig::from(profile.steps);
+        steps.axes[1].steps = steps_per_mm;
+        profile.steps = steps.into();
+        profile
+    };
+    assert_eq!(desk.ask(&Request::SetProfile(Some(with(1_650)))), Ok(()));
+    for steps_per_mm in [1_656, 1_700, 500_000] {
+        let refused = desk.ask(&Request::SetProfile(Some(with(steps_per_mm))));
+        assert_eq!(refused, Err(Reason::BadProfile), "{steps_per_mm}");
+        assert_eq!(desk.kept(), Some(with(1_650)));
+    }
+}
+
+#[test]
 fn a_profile_with_a_bad_value_is_refused() {
     let mut desk = Desk::new(Board::new());
     desk.ask(&Request::SetProfile(Some(profile()))).unwrap();

@@ -7,7 +7,7 @@
 //!              └─► follow.rs                when a move has come to rest: what came of it, and of a homing (homing.rs) the next move
 //! ```
 //!
-//! **Stops.** Limit switch, safety door, dead man and operator stop along the ramp of the move. Emergency stop and drive fault end it at once, because the drives are off.
+//! **Stops.** Limit switch, safety door, dead man, faults of the steps and operator stop along the ramp of the move. Emergency stop and drive fault end it at once, because the drives are off.
 //! **Door.** While it is open, motion is no faster than [`DOOR_MM_S`].
 //! **Dead man.** A continuous jog stops when its request is not repeated for [`DEAD_MAN_TICKS`], every other motion when the host is not heard for [`HEARD_TICKS`].
 //! **Latch.** Pulses lag by one period, and inputs are read at a period's start: the axes are then where the sample before the last one has placed them.
@@ -214,7 +214,7 @@ impl Manual {
     }
 
     /// Stops along the ramp, for this reason; the first one counts.
-    fn stop(&mut self, why: MotionEnd) {
+    pub(crate) fn stop(&mut self, why: MotionEnd) {
         if self.is_active() {
             self.line.stop();
             self.ending.get_or_insert(why);

@@ -28,7 +28,7 @@ use interp_core::{
     sample::State,
     steps::{BUFFER_WORDS, CheckedSteps, Steps},
 };
-use protocol::message::{Clock, InputLines, Report, ResetCause};
+use protocol::message::{Clock, InputLines, MotionEnd, Report, ResetCause};
 
 use self::control::{Control, Planning};
 use crate::{
@@ -140,7 +140,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
     }
 
     /// After the tick: computes the pulses that move the axes to its sample in the next period; see [`Steps::step`]. Too many steps
-    /// stop the run.
+    /// stop the run, or the motion outside a job, along its path; those that do not fit are made up for in the periods after.
     ///
     /// A job without limits has no approach to its passes: the axes are assumed to stand at the first sample of each, as if
     /// moved there by other means. Such a job is for evaluation only, not for a machine.
@@ -163,12 +163,20 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         }
     }
 
-    /// Controlled stop (category 1) with an external fault, along the path.
+    /// Controlled stop (category 1) with an external fault, along the path. Outside a run the faults of the steps stop the axes; pulses that were not emitted lose
+    /// their position.
     #[cold]
     #[inline(never)]
     pub fn controlled_stop(&mut self, fault: Fault) {
-        if moves(self.interpolator.state()) {
-            self.interpolator.controlled_stop(fault);
+        if fault.kind == FaultKind::StepOutput {
+            self.control.safety.set_homed(None);
+            self.lose_position();
+        }
+        match fault.kind {
+            _ if moves(self.interpolator.state()) => self.interpolator.controlled_stop(fault),
+            FaultKind::StepRate => self.control.manual.stop(MotionEnd::StepRate),
+            FaultKind::StepOutput => self.control.manual.stop(MotionEnd::StepOutput),
+            _ => {}
         }
     }
 
@@ -461,3 +469,6 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         missed == 0 && cycles <= self.control.tick_budget
     }
 }
+
+#[cfg(test)]
+mod tests;

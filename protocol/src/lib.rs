@@ -58,7 +58,7 @@
 //! | a start while the axes do not stand at the job's home | `Nak`, `NotAtHome` with both positions | |
 //! | a value beyond its range | `Nak`, `OutOfRange` with the range | |
 //! | a job that exceeds the board's profile, or other steps than the profile's | `Nak`, `BeyondProfile` with the value | |
-//! | a profile with an invalid value | `Nak`, `BadProfile` | |
+//! | a profile with an invalid value, or with more steps than a period holds | `Nak`, `BadProfile` | |
 //! | a profile that cannot be kept | `Nak`, `Storage` | |
 //! | a start of a job that was loaded under another profile | `Nak`, `OtherProfile` | |
 //! | a start of a job without axis limits, on a board with drives that has to be homed | `Nak`, `NoLimits` | |

@@ -86,11 +86,15 @@ pub enum MotionEnd {
     WrongSwitch,
     /// 11: the safety door was opened.
     Door,
+    /// 12: an axis was to make more steps than a period holds; none is lost.
+    StepRate,
+    /// 13: step pulses were not emitted in time; the position is lost.
+    StepOutput,
 }
 
 impl MotionEnd {
     /// Every end, in order of its code.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 14] = [
         Self::None,
         Self::Done,
         Self::Stopped,
@@ -103,6 +107,8 @@ impl MotionEnd {
         Self::Stuck,
         Self::WrongSwitch,
         Self::Door,
+        Self::StepRate,
+        Self::StepOutput,
     ];
 
     /// Its name in JSON.
@@ -121,6 +127,8 @@ impl MotionEnd {
             Self::Stuck => "stuck",
             Self::WrongSwitch => "wrong-switch",
             Self::Door => "door",
+            Self::StepRate => "step-rate",
+            Self::StepOutput => "step-output",
         }
     }
 }

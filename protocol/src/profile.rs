@@ -150,6 +150,28 @@ impl Profile {
                 .is_none_or(|homing| self.travel_nm.is_some() && homing.is_valid(self.velocity_mm_s))
     }
 
+    /// Whether a period of this length, s, holds the steps of each axis at its greatest velocity. Half a step is left for positions in whole nanometres.
+    #[must_use]
+    pub fn has_room_for_steps(&self, period_s: f32) -> bool {
+        let config = StepConfig::from(self.steps);
+        let Ok(checked) = config.check() else {
+            return false;
+        };
+        #[allow(
+            clippy::cast_precision_loss,
+            reason = "steps_max is at most 500; a ratio needs no last digit"
+        )]
+        let (steps_max, scale) = (
+            checked.steps_max() as f32,
+            config.axes.map(|axis| axis.steps as f32 / axis.mm as f32),
+        );
+        let steps = |(velocity_mm_s, scale)| velocity_mm_s * scale * period_s;
+        self.velocity_mm_s
+            .into_iter()
+            .zip(scale)
+            .all(|axis| steps(axis) + 0.5 < steps_max)
+    }
+
     /// The first limit that a job's axes exceed, if any.
     #[must_use]
     pub fn exceeded_by(&self, axes: &AxisLimits) -> Option<Excess> {

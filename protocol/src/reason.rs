@@ -123,7 +123,7 @@ pub enum Reason {
         /// What does.
         excess: Excess,
     },
-    /// 21: a profile with a value out of range.
+    /// 21: a profile with a value out of range, or with a velocity at which an axis has more steps than a period holds.
     BadProfile,
     /// 22: the board cannot write its settings: they are as before.
     Storage,
@@ -361,7 +361,10 @@ impl fmt::Display for Reason {
                 "the board keeps its events from number {first} on only"
             ),
             Self::BeyondProfile { excess } => beyond_profile(excess, formatter),
-            Self::BadProfile => write!(formatter, "a value of the profile is out of range"),
+            Self::BadProfile => write!(
+                formatter,
+                "a value of the profile is out of range, or an axis is too fast for its steps"
+            ),
             Self::Storage => write!(formatter, "the board cannot write its settings"),
             Self::OtherProfile => write!(formatter, "the job was loaded under another profile"),
             Self::NoLimits => write!(

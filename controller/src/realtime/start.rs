@@ -200,60 +200,8 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use interp_core::{
-        encode,
-        job::{AxisLimits, Header},
-        steps::StepConfig,
-    };
+    use crate::realtime::tests::{DRIVES_ON, HOME_NM, order, with_plate};
     use protocol::message::Configuration;
-
-    const HOME_NM: [i32; 3] = [-2_500, 5_000, 20_000_000];
-    const DRIVES_ON: Order = Order::Drives { on: true };
-
-    /// A plate of 10 mm x 10 mm, level at the origin; with limits, from this home.
-    fn with_plate(home_nm: Option<[i32; 3]>) -> RealTime<[i32; 64]> {
-        let mut c = [[[0.0; 4]; 4]; 3];
-        (c[0][1][0], c[1][0][1]) = (10.0, 10.0);
-        let c = c.map(|axis| encode::substitute(&axis, [0.0, 1.0], [0.0, 1.0]));
-        let one = encode::width(1.0).unwrap();
-        let patch = encode::polynomial(&c, Default::default()).unwrap();
-        let axes = home_nm.map(|home_nm| AxisLimits {
-            velocity_mm_s: [100.0; 3],
-            acceleration_mm_s2: [1000.0; 3],
-            jerk_mm_s3: [20_000.0; 3],
-            chord_mm: 0.005,
-            overrun_mm: 0.0,
-            travel_nm: [[i32::MIN, i32::MAX]; 3],
-            home_nm,
-            plunge_mm: 1.0,
-            end_nm: None,
-            end_height_nm: 0,
-            safe_z_nm: 20_000_000,
-        });
-        let header = Header {
-            path_spans: 1,
-            side_spans: 1,
-            ball_radius_mm: 5.0,
-            feed_mm_s: 10.0,
-            scallop_mm: 0.1,
-            period_s: 0.001,
-            axes,
-            ..Header::default()
-        };
-        let mut half = RealTime::new();
-        let words: std::vec::Vec<i32> = [one, one].into_iter().chain(patch.to_words()).collect();
-        half.load_begin(&header, u32::try_from(words.len()).unwrap())
-            .unwrap();
-        half.load_words(0, &words).unwrap();
-        half.load_check(0).unwrap();
-        half.load_finish().unwrap();
-        half.set_step_pins(StepConfig::DEFAULT.check().unwrap(), [0, 1, 2]);
-        half
-    }
-
-    fn order(half: &mut RealTime<[i32; 64]>, order: Order) {
-        half.order(order).unwrap();
-    }
 
     #[test]
     fn a_home_places_steps_and_tool() {

@@ -29,7 +29,8 @@ impl Session {
         profile: Option<&Profile>,
     ) -> Result<(), Reason> {
         no_run(machine)?;
-        if profile.is_some_and(|profile| !profile.is_valid()) {
+        let period_s = period_s(machine);
+        if profile.is_some_and(|profile| !profile.is_valid() || !profile.has_room_for_steps(period_s)) {
             return Err(Reason::BadProfile);
         }
         self.forget_places(machine);
@@ -95,10 +96,17 @@ fn set_up(machine: &mut impl Machine) -> Result<(), Reason> {
 
 #[inline(never)]
 fn setup_of(machine: &mut impl Machine) -> Option<Setup> {
-    #[allow(clippy::cast_precision_loss, reason = "a period is below 2^24 us")]
-    let period_s = machine.description().period_us as f32 * 1e-6;
+    let period_s = period_s(machine);
     let profile = machine.profile()?;
     Some(Setup::new(&profile, period_s))
+}
+
+/// Length of a period, s.
+#[inline(never)]
+fn period_s(machine: &mut impl Machine) -> f32 {
+    #[allow(clippy::cast_precision_loss, reason = "a period is below 2^24 us")]
+    let period_us = machine.description().period_us as f32;
+    period_us * 1e-6
 }
 
 /// The settings of the drives of a job that has none: the profile's, or the board's own.

@@ -196,10 +196,10 @@ pub(super) const ENTRIES: [Entry; 39] = [
     reason(
         21,
         "bad-profile",
-        "A value of the machine profile is out of its range.",
+        "A value of the machine profile is out of its range, or an axis is too fast for its steps.",
         "None.",
-        "Limits have to be above 0, travel has to ascend, steps per millimetre are 1/1000 to 500000.",
-        "Correct the profile; `cargo sim settings` checks its file before it is sent.",
+        "Limits have to be above 0, travel has to ascend, steps per millimetre are 1/1000 to 500000; `velocity_max_mm_s` times `steps_per_mm` has to be half a step below what a period holds: 500 in a millisecond with pulses of 1 us, 500 / n with pulses of n us.",
+        "Correct the profile: a lower velocity, coarser microsteps or a shorter `pulse_us` for too many steps. `cargo sim settings` checks ranges in its file before it is sent.",
         "A profile sent by another program, with a jerk limit of 0.",
     ),
     reason(

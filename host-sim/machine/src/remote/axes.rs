@@ -79,6 +79,14 @@ pub fn failure(motion: &MotionStatus) -> Option<(String, &'static str)> {
             "the safety door was opened: the axes have stopped along their ramp".to_owned(),
             "close it and ask again; while it is open, axes move at 33 mm/s at most",
         ),
+        MotionEnd::StepRate => (
+            "an axis was to make more steps than a period holds: the axes have stopped along their ramp, and no step is lost".to_owned(),
+            "lower its velocity_max_mm_s in the profile, take coarser microsteps or a shorter pulse_us",
+        ),
+        MotionEnd::StepOutput => (
+            "the board could not output its step pulses in time: the position is lost".to_owned(),
+            "home again; if it recurs, report it: explain step-output",
+        ),
         MotionEnd::DrivesOff => (
             "the drives went off: emergency stop or drive fault".to_owned(),
             "release it, then: operate acknowledge, operate on, and home again",
