@@ -7,8 +7,8 @@ use interp_core::{
     steps::{AxisSteps, StepConfig},
 };
 use protocol::message::{
-    Configuration, DoorContact, Excess, LinkTimeoutAction, Profile, ProfileLimit, Reason, Reply, Request,
-    Status, StepSettings,
+    Clock, Configuration, DoorContact, Excess, LinkTimeoutAction, Offsets, Profile, ProfileLimit, Reason,
+    Reply, Request, SpindleOrder, Status, StepSettings,
 };
 
 const WORDS: usize = 64;
@@ -247,6 +247,63 @@ fn a_job_is_loaded_again_after_a_change_of_the_profile() {
     desk.ask(&Request::SetProfile(Some(profile()))).unwrap();
     desk.load(limited()).unwrap();
     assert_eq!(desk.ask(&Request::Start), Ok(()));
+}
+
+/// A start was checked against profile, offsets, spindle and step settings: none of them changes before it is executed, queued or waiting for credit; nor does the clock of
+/// one that is queued.
+#[test]
+fn nothing_that_a_start_was_checked_by_changes_before_its_period() {
+    let mut narrow = profile();
+    narrow.travel_nm = Some([[-1, 1]; 3]);
+    for clock in [Clock::Free, Clock::Lockstep] {
+        for request in [
+            Request::SetProfile(Some(narrow)),
+            Request::SetProfile(None),
+            Request::SetOffsets(Offsets::NONE),
+            Request::Spindle(SpindleOrder::OFF),
+            Request::StepConfig(profile().steps),
+            Request::Clock(Clock::Lockstep),
+            Request::Clock(Clock::Free),
+        ] {
+            if clock == Clock::Lockstep && matches!(request, Request::Clock(_)) {
+                continue;
+            }
+            let mut desk = Desk::new(Board::new());
+            desk.ask(&Request::SetProfile(Some(profile()))).unwrap();
+            desk.load(limited()).unwrap();
+            desk.ask(&Request::Drives { on: true }).unwrap();
+            let home_nm = [0, 0, 50_000_000];
+            desk.ask(&Request::SetHome { home_nm }).unwrap();
+            desk.ask(&Request::Clock(clock)).unwrap();
+            // On a free clock within the tick of the start.
+            desk.board.receive(&desk.host.next(&Request::Start));
+            if clock == Clock::Lockstep {
+                desk.board.tick();
+            }
+            desk.board.receive(&desk.host.next(&request));
+            let replies = desk.host.read(&desk.board.take_sent());
+            let refused = |reply: &&Reply| {
+                matches!(
+                    reply,
+                    Reply::Nak {
+                        reason: Reason::Busy,
+                        ..
+                    }
+                )
+            };
+            assert!(
+                replies.last().is_some_and(|reply| refused(&reply)),
+                "{clock:?}, {request:?}: {replies:?}"
+            );
+            assert_eq!(desk.kept(), Some(profile()));
+            if clock == Clock::Lockstep {
+                desk.board.receive(&desk.host.next(&Request::Run { ticks: 1 }));
+            }
+            (0..3).for_each(|_| desk.board.tick());
+            desk.board.take_sent();
+            assert!(desk.status().state.is_under_way());
+        }
+    }
 }
 
 #[test]

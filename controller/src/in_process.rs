@@ -182,6 +182,10 @@ impl<const WORDS: usize> Machine for Half<WORDS> {
     fn instructions_wait(&mut self) -> bool {
         !self.commands.is_empty()
     }
+
+    fn start_waits(&mut self) -> bool {
+        self.real_time.start_waits()
+    }
 }
 
 /// The whole board except its pins.

@@ -221,4 +221,7 @@ pub trait Machine {
     /// Whether earlier instructions are still queued: a queued start must not be applied to another job than
     /// the one loaded when it was sent.
     fn instructions_wait(&mut self) -> bool;
+
+    /// [`crate::realtime::RealTime::start_waits`].
+    fn start_waits(&mut self) -> bool;
 }

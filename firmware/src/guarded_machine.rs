@@ -190,4 +190,8 @@ impl<M: Mutex<T = BoardRealTime>, F: Mutex<T = BoardFalling>> Machine for Guarde
     fn instructions_wait(&mut self) -> bool {
         !self.commands.is_empty()
     }
+
+    fn start_waits(&mut self) -> bool {
+        self.real_time.lock(|real_time| real_time.start_waits())
+    }
 }

@@ -46,6 +46,7 @@
 //! | a chunk of a streamed job with a row whose digest is wrong, or that the core refuses | `Nak`, `WrongDigest`, `Job` with fault, value, record | a run stops before that row |
 //! | a chunk or `JobEnd` without `JobBegin` | `Nak`, `NoUpload` | |
 //! | a command while the queue of commands is full | `Nak`, `Busy` | |
+//! | profile, offsets, spindle or step settings while a start waits for its period, a clock while it is queued | `Nak`, `Busy` | |
 //! | `Run` without lockstep | `Nak`, `WrongClock` with the clock | |
 //! | what this board does not support | `Nak`, `Unsupported` | |
 //! | `JobEnd` too early | `Nak`, `Incomplete` | the upload may go on |

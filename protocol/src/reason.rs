@@ -48,8 +48,8 @@ pub enum Reason {
         /// Time base of the board.
         clock: Clock,
     },
-    /// 7: the command queue is full, or it holds a command for the job that this request would replace; ask again, with
-    /// a new number.
+    /// 7: the command queue is full, or it holds a command for the job that this request would replace, or a start waits that was checked by what this
+    /// request would change; ask again, with a new number.
     Busy,
     /// 8: the core refuses the job. From `JobBegin` and `JobChunk` nothing has changed; from `JobEnd` the upload is aborted
     /// and the machine is idle.

@@ -338,4 +338,8 @@ impl Machine for Mock {
     fn instructions_wait(&mut self) -> bool {
         false
     }
+
+    fn start_waits(&mut self) -> bool {
+        false
+    }
 }

@@ -99,6 +99,12 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         }
     }
 
+    /// Whether a start waits for its period: in lockstep for credit, on a free clock for the spindle.
+    #[must_use]
+    pub fn start_waits(&self) -> bool {
+        self.control.command == Some(Command::Start)
+    }
+
     /// Executes a start: resets the record of the run, or refuses the start for a reason that
     /// arose after the link's check.
     #[cold]

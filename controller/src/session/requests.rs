@@ -72,6 +72,9 @@ impl Session {
         if needs_rest(request) && machine.motion().activity != Activity::Rest {
             return Err(Reason::Moving);
         }
+        if is_of_start(request) && (self.command_waits(machine) || machine.start_waits()) {
+            return Err(Reason::Busy);
+        }
         match *request {
             Request::SetProfile(ref profile) => self.set_profile(machine, profile.as_ref()),
             Request::SetOffsets(ref offsets) => self.set_offsets(machine, offsets),
@@ -141,6 +144,12 @@ impl Session {
         }
     }
 
+    /// Whether a command of the session is still queued.
+    fn command_waits(&mut self, machine: &mut impl Machine) -> bool {
+        self.commanded = self.commanded && machine.instructions_wait();
+        self.commanded
+    }
+
     /// Refuses while commands for the previous job are queued.
     #[inline(never)]
     pub(super) fn job_begin(
@@ -150,7 +159,7 @@ impl Session {
         words: u32,
         digest: u64,
     ) -> Result<(), Reason> {
-        if self.commanded && machine.instructions_wait() {
+        if self.command_waits(machine) {
             return Err(Reason::Busy);
         }
         let profile = machine.profile();
@@ -229,6 +238,9 @@ impl Session {
     /// A change of the clock during a motion would be a velocity step of the axes.
     fn set_clock(&mut self, machine: &mut impl Machine, clock: Clock) -> Result<(), Reason> {
         no_run(machine)?;
+        if self.command_waits(machine) {
+            return Err(Reason::Busy);
+        }
         instruct(machine, Instruction::Clock(clock))?;
         self.clock = clock;
         Ok(())
@@ -250,6 +262,14 @@ const fn needs_rest(request: &Request) -> bool {
             | Request::StoreJob { .. }
             | Request::DeleteJob { .. }
             | Request::StartJob { .. }
+    )
+}
+
+/// Whether the request changes what a start is checked by, or what it starts with.
+const fn is_of_start(request: &Request) -> bool {
+    matches!(
+        request,
+        Request::SetProfile(_) | Request::SetOffsets(_) | Request::Spindle(_) | Request::StepConfig(_)
     )
 }
 

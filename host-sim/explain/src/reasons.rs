@@ -70,9 +70,9 @@ pub(super) const ENTRIES: [Entry; 39] = [
     reason(
         7,
         "busy",
-        "Too many commands wait for the next period.",
+        "Too many commands wait for the next period, or a start that this request would change.",
         "None.",
-        "Commands come faster than periods, and the queue for them is full.",
+        "Commands come faster than periods, and the queue for them is full; or profile, offsets, spindle, clock, steps or job are changed while a start waits for its period.",
         "Repeat the request after a period, with a new number, as `cargo sim` does.",
         "A custom host that sends hold and resume in a loop.",
     ),
