@@ -5,7 +5,10 @@ use interp_core::State;
 use job::Pattern;
 use machine::prepare::prepare;
 use protocol::digest::job_digest;
-use protocol::message::{InputLines, JobName, Reason, Reply, Request, StoredJobInfo, job_mark};
+use protocol::message::{
+    AtSpeed, InputLines, JobName, LinkTimeoutAction, Reason, Reply, Request, SpindleOrder, SpindleSettings,
+    StoredJobInfo, Turning, job_mark,
+};
 
 use crate::pause::sample_job;
 use crate::resume::{Bench, STEP_NM, profile};
@@ -188,4 +191,46 @@ fn the_start_button_needs_no_host() {
     press(&mut bench);
     assert_eq!(bench.board.status().state, State::Ready);
     assert_eq!(bench.board.status().samples, 0);
+}
+
+/// Nobody is missed either where the start waits for the spindle.
+#[test]
+fn the_start_button_needs_no_host_while_the_spindle_comes_up_to_speed() {
+    let job = sample_job("torus", Pattern::Zigzag, 0.0, None);
+    let prepared = prepare(&job).unwrap();
+    let start = prepared.header.axes.unwrap().home_nm.map(|nm| nm / STEP_NM);
+    let mut bench = Bench::new(Box::new(Board::new()), start);
+    let mut profile = profile(&job);
+    profile.configuration.on_link_timeout = LinkTimeoutAction::Hold;
+    profile.configuration.link_timeout_ticks = 100;
+    profile.spindle = Some(SpindleSettings {
+        max_rpm: 24_000,
+        at_speed_ticks: 1_000,
+        stops_at_pause: true,
+        at_speed: AtSpeed::ByTime,
+    });
+    bench.ask(&Request::SetProfile(Some(profile)));
+    let home_nm = bench.home();
+    bench.load(&prepared, home_nm);
+    bench.ask(&Request::Spindle(SpindleOrder {
+        turning: Turning::Clockwise,
+        rpm: 12_000,
+        coolant: false,
+    }));
+    bench.ask(&Request::StoreJob {
+        name: name("left"),
+        begins_anywhere: true,
+    });
+    ticks(&mut bench, 100);
+    press(&mut bench);
+    ticks(&mut bench, 500);
+    assert_eq!(bench.board.status().state, State::Ready, "the start waits");
+    ticks(&mut bench, 1_000);
+    let status = bench.board.status();
+    assert!(
+        status.state.is_under_way() && !status.safety.link_timed_out,
+        "{status:?}"
+    );
+    assert_ne!(status.state, State::Held);
+    assert_eq!(bench.run(u32::MAX), State::Finished);
 }

@@ -195,7 +195,9 @@ impl Session {
             return;
         }
         let status = machine.status();
-        self.button.runs_alone &= status.state.is_under_way();
+        // A start that waits for its spindle is not under way yet.
+        self.button.runs_alone &=
+            status.state.is_under_way() || machine.motion().activity == Activity::SpinUp;
         if self.button.runs_alone {
             // A run that the button has started needs no host.
             machine.heard();
