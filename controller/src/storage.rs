@@ -2,7 +2,7 @@
 //!
 //! Two sectors, each divided into slots of [`SLOT`] bytes; a record takes as many slots as it needs. A record is appended to the active sector: sequence number, kind, payload,
 //! then a CRC-32; one that was not written to its end does not count. The active sector is that of the newest record. When it is full, the other sector becomes active, and
-//! begins with a copy of the records in force. **An erase stops the processor for seconds**, so it happens at power-up only ([`Storage::open`]): then the spare sector is erased,
+//! begins with the next record and a copy of those in force, so that the full one can be erased whatever follows. **An erase stops the processor for seconds**, so it happens at power-up only ([`Storage::open`]): then the spare sector is erased,
 //! and a record in the active one says so. Without that record it is erased again, because an erase that was cut short may leave bits that read differently
 //! every time.
 //!
@@ -239,13 +239,29 @@ impl<F: NorFlash> Storage<F> {
     /// # Errors
     /// The payload is longer than [`PAYLOAD_MAX`], the flash fails, or it is full until the next power-up.
     pub fn keep(&mut self, kind: Kind, payload: &[u8]) -> Result<(), StorageError> {
-        if self.active.next + slots_of(payload.len()) as u32 > Self::SLOTS {
+        if payload.len() > PAYLOAD_MAX {
+            return Err(StorageError);
+        }
+        let is_full = self.active.next + slots_of(payload.len()) as u32 > Self::SLOTS;
+        if is_full {
             self.swap()?;
         }
-        self.append(kind, payload)
+        self.append(kind, payload)?;
+        if is_full {
+            // A prepared record has the slot behind the first.
+            self.active.next += 1;
+            self.carry_over_now();
+        }
+        Ok(())
     }
 
-    /// Makes the other sector the active one. The full one stays until the next power-up, which copies its records in force and erases it.
+    /// After the other sector has become the active one: copies what is in force, so that there is room for it whatever follows. What cannot be copied now is copied at the
+    /// next power-up.
+    fn carry_over_now(&mut self) {
+        let _ = self.carry_over();
+    }
+
+    /// Makes the other sector the active one. The full one stays until the next power-up, which erases it.
     fn swap(&mut self) -> Result<(), StorageError> {
         if !self.active.has_spare {
             return Err(StorageError);
@@ -293,6 +309,9 @@ impl<F: NorFlash> Storage<F> {
         };
         // A new chip's spare has no record that says so.
         self.active.has_spare |= before.has_spare && before.sector == self.active.sector;
+        if self.active.sector != before.sector {
+            self.carry_over_now();
+        }
     }
 
     /// Writes a record into the next slots, and reads it back.
