@@ -10,7 +10,7 @@ use job::{Job, Pattern};
 use machine::prepare::{Prepared, prepare};
 use protocol::digest::job_digest;
 use protocol::message::{
-    Configuration, DoorContact, Journal, Profile, Reason, Reply, Request, Status, job_mark,
+    Configuration, DoorContact, JobName, Journal, Offsets, Profile, Reason, Reply, Request, Status, job_mark,
 };
 
 use crate::pause::sample_job;
@@ -413,6 +413,79 @@ fn a_place_is_of_the_job_and_the_profile_that_ran() {
     other.velocity_mm_s[0] += 1.0;
     bench.ask(&Request::SetProfile(Some(other)));
     check(bench, journal);
+}
+
+/// With a full journal a run is not noted: a place of an earlier one is none of it, and the new workpiece is not resumed behind passes that it never saw.
+#[test]
+fn a_run_that_a_full_journal_cannot_note_is_not_resumed_at_an_earlier_ones_place() {
+    let job = sample_job("torus", Pattern::Zigzag, 0.0, None);
+    let prepared = prepare(&job).unwrap();
+    let start = prepared.header.axes.unwrap().home_nm.map(|nm| nm / STEP_NM);
+    let mut bench = Bench::new(Box::new(Board::new()), start);
+    bench.ask(&Request::SetProfile(Some(profile(&job))));
+    let home_nm = bench.home();
+    bench.load(&prepared, home_nm);
+    bench.ask(&Request::StoreJob {
+        name: JobName::try_from("left").unwrap(),
+        begins_anywhere: true,
+    });
+    let until_pass = |bench: &mut Bench, pass| {
+        bench.trail.clear();
+        bench.ask(&Request::Start);
+        while bench.trail.iter().filter(|sample| sample.pass == pass).count() < 500 {
+            bench.tick();
+        }
+    };
+    let abort = |bench: &mut Bench| {
+        bench.ask(&Request::Abort);
+        while bench.board.status().state != State::Ready {
+            bench.tick();
+        }
+        bench.rest();
+    };
+    until_pass(&mut bench, 3);
+    abort(&mut bench);
+    assert_eq!(bench.journal().unwrap().pass, 3);
+    let full = |bench: &mut Bench| {
+        for tool_nm in 0..2_000 {
+            let offsets = Offsets {
+                tool_nm,
+                ..Offsets::NONE
+            };
+            match bench.answer(&Request::SetOffsets(offsets)) {
+                Reply::Ack { .. } => {}
+                Reply::Nak { reason, .. } => return assert_eq!(reason, Reason::Storage),
+                other => panic!("{other:?}"),
+            }
+        }
+        panic!("never full");
+    };
+    full(&mut bench);
+    let stands_nm = bench.board.real_time().motion().at_nm;
+    bench.load(&prepared, stands_nm);
+    // The first place is over; the one after it is not noted either, nor that of a supply that falls.
+    for pass in [1, 2] {
+        until_pass(&mut bench, pass);
+        if pass == 1 {
+            abort(&mut bench);
+        }
+        let journal = bench.journal().unwrap();
+        assert!(journal.is_finished, "{journal:?}");
+    }
+    let mut bench = bench.cut(true);
+    bench.home();
+    let name = JobName::try_from("left").unwrap();
+    let resume = Request::StartJob { name, resumes: true };
+    let Reply::Nak { reason, .. } = bench.answer(&resume) else {
+        panic!("{:?}", bench.board.status());
+    };
+    assert_eq!(reason, Reason::NothingToResume);
+    // Switched on anew, the board journals again.
+    let name = JobName::try_from("left").unwrap();
+    bench.ask(&Request::StartJob { name, resumes: false });
+    bench.run(1_000);
+    let journal = bench.journal().unwrap();
+    assert!(!journal.is_finished && journal.pass == 0, "{journal:?}");
 }
 
 #[test]

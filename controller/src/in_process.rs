@@ -123,6 +123,10 @@ impl<const WORDS: usize> Machine for Half<WORDS> {
         self.settings.keep_journal(journal)
     }
 
+    fn end_journal(&mut self) -> Result<(), StorageError> {
+        self.settings.end_journal()
+    }
+
     fn prepare_journal(&mut self, journal: Option<&Journal>) {
         self.prepared = self.settings.prepare_journal(journal, false);
     }

@@ -164,6 +164,12 @@ pub trait Machine {
     /// The storage cannot be written, or is full until the next power-up.
     fn keep_journal(&mut self, journal: &Journal) -> Result<(), StorageError>;
 
+    /// Journals the end of the run that the newest record is of, where [`Self::keep_journal`] finds the storage full.
+    ///
+    /// # Errors
+    /// The storage cannot be written.
+    fn end_journal(&mut self) -> Result<(), StorageError>;
+
     /// Sets the record that is written when the supply falls; none: nothing is written then. To be set again after each [`Self::keep_journal`].
     fn prepare_journal(&mut self, journal: Option<&Journal>);
 

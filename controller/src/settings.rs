@@ -84,6 +84,23 @@ impl<F: NorFlash> Settings<F> {
         self.storage.keep(Kind::Journal, &journal.write())
     }
 
+    /// Where [`Self::keep_journal`] finds the flash full: journals the end of the run that the newest record is of, so that it is not resumed in place of a later one.
+    ///
+    /// # Errors
+    /// The flash cannot be written.
+    pub fn end_journal(&mut self) -> Result<(), StorageError> {
+        match self.journal() {
+            Some(journal) if !journal.is_finished => {
+                let ended = Journal {
+                    is_finished: true,
+                    ..journal
+                };
+                self.storage.keep_last(Kind::Journal, &ended.write())
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// A record of the journal for [`Storage::prepare`]. `was_written`: the one before was.
     pub fn prepare_journal(&mut self, journal: Option<&Journal>, was_written: bool) -> Option<Prepared> {
         if was_written {

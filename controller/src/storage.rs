@@ -2,7 +2,7 @@
 //!
 //! Two sectors, each divided into slots of [`SLOT`] bytes; a record takes as many slots as it needs. A record is appended to the active sector: sequence number, kind, payload,
 //! then a CRC-32; one that was not written to its end does not count. The active sector is that of the newest record. When it is full, the other sector becomes active, and
-//! begins with the next record and a copy of those in force, so that the full one can be erased whatever follows. **An erase stops the processor for seconds**, so it happens at power-up only ([`Storage::open`]): then the spare sector is erased,
+//! begins with the next record and a copy of those in force, so that the full one can be erased whatever follows. Where there is no other, [`RESERVE`] is left blank. **An erase stops the processor for seconds**, so it happens at power-up only ([`Storage::open`]): then the spare sector is erased,
 //! and a record in the active one says so. Without that record it is erased again, because an erase that was cut short may leave bits that read differently
 //! every time.
 //!
@@ -35,6 +35,9 @@ pub const PAYLOAD_MAX: usize = RECORD_MAX - HEAD - CRC;
 const fn slots_of(payload: usize) -> usize {
     (HEAD + payload + CRC).div_ceil(SLOT)
 }
+
+/// Slots left blank where there is no other sector: for a record that has to be written when the flash is full ([`Storage::keep_last`]).
+const RESERVE: u32 = 1;
 
 /// Blank slots behind which there is no record: one is left blank by a record that was prepared.
 const BLANK_SLOTS: u32 = 4;
@@ -242,7 +245,7 @@ impl<F: NorFlash> Storage<F> {
         if payload.len() > PAYLOAD_MAX {
             return Err(StorageError);
         }
-        let is_full = self.active.next + slots_of(payload.len()) as u32 > Self::SLOTS;
+        let is_full = self.active.next + slots_of(payload.len()) as u32 > self.slots();
         if is_full {
             self.swap()?;
         }
@@ -253,6 +256,23 @@ impl<F: NorFlash> Storage<F> {
             self.carry_over_now();
         }
         Ok(())
+    }
+
+    /// Keeps a record of one slot where [`Self::keep`] finds the flash full. Once until the next power-up.
+    ///
+    /// # Errors
+    /// It is written already, or the flash fails.
+    pub fn keep_last(&mut self, kind: Kind, payload: &[u8]) -> Result<(), StorageError> {
+        self.append(kind, payload)
+    }
+
+    /// Slots of the active sector that records may take.
+    const fn slots(&self) -> u32 {
+        if self.active.has_spare {
+            Self::SLOTS
+        } else {
+            Self::SLOTS - RESERVE
+        }
     }
 
     /// After the other sector has become the active one: copies what is in force, so that there is room for it whatever follows. What cannot be copied now is copied at the
@@ -286,7 +306,7 @@ impl<F: NorFlash> Storage<F> {
             has_spare,
         } = self.active;
         let after = next + 1;
-        let (sector, slot) = match after.checked_sub(Self::SLOTS) {
+        let (sector, slot) = match after.checked_sub(self.slots()) {
             None => (sector, after),
             Some(beyond) if has_spare => (1 - sector, beyond),
             Some(_) => return None,

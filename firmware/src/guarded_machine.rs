@@ -130,6 +130,10 @@ impl<M: Mutex<T = BoardRealTime>, F: Mutex<T = BoardFalling>> Machine for Guarde
         }
     }
 
+    fn end_journal(&mut self) -> Result<(), StorageError> {
+        self.settings.end_journal()
+    }
+
     fn prepare_journal(&mut self, journal: Option<&Journal>) {
         // The supply may have come back before it was too low.
         let was_written = self.falling.lock(FallingRecord::take_written);

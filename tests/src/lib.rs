@@ -274,6 +274,10 @@ impl Machine for Mock {
         Ok(())
     }
 
+    fn end_journal(&mut self) -> Result<(), StorageError> {
+        Ok(())
+    }
+
     fn prepare_journal(&mut self, _: Option<&Journal>) {}
 
     type JobFlash = RamFlash<0>;

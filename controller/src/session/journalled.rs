@@ -12,9 +12,11 @@ impl Session {
     pub(super) fn journal_start(&mut self, machine: &mut impl Machine, start: RunStart) {
         self.journalling = Journalling::NONE;
         machine.prepare_journal(None);
-        if let Some(journal) = self.journal(start, false) {
-            // A run is not hindered by a journal that is full, or absent.
-            let _ = machine.keep_journal(&journal);
+        if let Some(journal) = self.journal(start, false)
+            && machine.keep_journal(&journal).is_err()
+        {
+            // A run is not hindered by a journal that is full, or absent; but an earlier one is not resumed in its place.
+            let _ = machine.end_journal();
         }
     }
 

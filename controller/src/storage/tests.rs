@@ -88,14 +88,19 @@ fn the_newest_record_is_in_force() {
 fn without_a_power_up_there_is_room_for_two_sectors() {
     let mut storage = Storage::open(RamFlash::<SECTOR>::new());
     // One is left blank behind the first record of a sector that has become active.
-    for record in 0..2 * SLOTS - 1 {
+    for record in 0..2 * SLOTS - 2 {
         storage.keep(Kind::Profile, &[record as u8]).unwrap();
     }
     assert_eq!(storage.keep(Kind::Profile, &[98]), Err(StorageError));
     assert_eq!(
         storage.newest(Kind::Profile).unwrap().bytes(),
-        [2 * SLOTS as u8 - 2]
+        [2 * SLOTS as u8 - 3]
     );
+    // One is left for a record that has to be written.
+    assert!(storage.prepare(Kind::Journal, &[98]).is_none());
+    storage.keep_last(Kind::Profile, &[97]).unwrap();
+    assert_eq!(storage.keep_last(Kind::Profile, &[98]), Err(StorageError));
+    assert_eq!(storage.newest(Kind::Profile).unwrap().bytes(), [97]);
     let mut storage = Storage::open(storage.flash);
     storage.keep(Kind::Profile, &[99]).unwrap();
     assert_eq!(storage.newest(Kind::Profile).unwrap().bytes(), [99]);
@@ -127,8 +132,8 @@ fn a_prepared_record_on_a_new_chip_leaves_room_for_two_sectors() {
     storage.flash.write(prepared.offset, &prepared.bytes).unwrap();
     storage.look_again();
     assert_eq!(storage.newest(Kind::Journal).unwrap().bytes(), [2]);
-    // Three slots are taken: the prepared record leaves one blank. In the spare so does the first, the profile takes one more.
-    for record in 3..2 * SLOTS as u8 - 2 {
+    // Three slots are taken: the prepared record leaves one blank. In the spare so does the first, the profile takes one more, and one is left.
+    for record in 3..2 * SLOTS as u8 - 3 {
         storage.keep(Kind::Journal, &[record]).unwrap();
     }
     assert_eq!(storage.keep(Kind::Journal, &[99]), Err(StorageError));
@@ -142,7 +147,7 @@ fn a_prepared_record_on_a_new_chip_leaves_room_for_two_sectors() {
     storage.flash.write(prepared.offset, &prepared.bytes).unwrap();
     storage.look_again();
     assert_eq!(storage.newest(Kind::Journal).unwrap().bytes(), [77]);
-    for record in 2..SLOTS as u8 {
+    for record in 2..SLOTS as u8 - 1 {
         storage.keep(Kind::Journal, &[record]).unwrap();
     }
     assert_eq!(storage.keep(Kind::Journal, &[99]), Err(StorageError));
@@ -175,10 +180,10 @@ fn a_power_cut_at_any_operation_loses_nothing_that_was_kept() {
                 bits,
             };
             let mut was_cut = false;
-            // There is always room for a sector of records less one, whatever the last power-up left.
+            // There is always room for a sector of records less two, whatever the last power-up left.
             'life: for turn in 0..5_u8 {
                 let mut storage = Storage::open(failing);
-                for record in 0..SLOTS as u8 - 1 - turn % 2 {
+                for record in 0..SLOTS as u8 - 2 - turn % 2 {
                     let payload = [turn, record, 0x55];
                     tried = Some(payload.to_vec());
                     if storage.keep(Kind::Profile, &payload).is_err() {

@@ -207,7 +207,7 @@ pub(super) const ENTRIES: [Entry; 39] = [
         "storage",
         "The board cannot write its settings; they are as before.",
         "None.",
-        "The two sectors have been filled since the last power-up, after some hundred changes of the profile, or the flash is worn out or protected.",
+        "The two sectors have been filled since the last power-up, by a record of the journal after each of some 6500 passes, or by changes of profile and offsets, or the flash is worn out or protected.",
         "Switch the board off and on, which erases a sector, and try again.",
         "A script that writes the profile in a loop.",
     ),
