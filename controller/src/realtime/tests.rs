@@ -9,7 +9,7 @@ use interp_core::{
     steps::StepConfig,
 };
 use protocol::message::{
-    Activity, Configuration, DoorContact, JogWay, MotionEnd, MotionStatus, Profile,
+    Activity, Configuration, DoorContact, JogWay, MotionEnd, MotionStatus, PassDigest, Profile,
 };
 use std::vec::Vec;
 
@@ -59,6 +59,27 @@ pub(super) fn with_plate(home_nm: Option<[i32; 3]>) -> RealTime<[i32; 64]> {
 
 pub(super) fn order(half: &mut RealTime<[i32; 64]>, order: Order) {
     half.order(order).unwrap();
+}
+
+/// A queue with places for this number of events.
+struct Queue {
+    places: usize,
+    events: Vec<Event>,
+}
+
+impl Events for Queue {
+    fn has_room(&self) -> bool {
+        self.places >= Self::TICK_MAX
+    }
+
+    fn put(&mut self, event: Event) -> bool {
+        let is_kept = self.places > 0;
+        if is_kept {
+            self.places -= 1;
+            self.events.push(event);
+        }
+        is_kept
+    }
 }
 
 /// One period, with the pulses of its sample and its planning.
@@ -148,4 +169,66 @@ fn pulses_that_are_not_emitted_end_a_jog_and_lose_the_position() {
     assert!(motion.at_nm[0] < 50_000_000);
     assert_eq!(half.interpolator.stands_nm(), None);
     assert!(!half.status().safety.homed);
+}
+
+/// A run of the plate, on its first pass.
+fn running(clock: Clock) -> RealTime<[i32; 64]> {
+    let mut half = with_plate(Some(HOME_NM));
+    order(&mut half, DRIVES_ON);
+    order(&mut half, Order::SetHome { home_nm: HOME_NM });
+    let mut events = Vec::new();
+    for instruction in [
+        Instruction::Clock(clock),
+        Instruction::Report(Report::Samples),
+        Instruction::Command(Command::Start),
+        Instruction::Run { ticks: 100_000 },
+    ] {
+        half.obey(instruction, &mut events);
+        tick(&mut half, &mut events);
+    }
+    for _ in 0..20_000 {
+        tick(&mut half, &mut events);
+        if half.last().state == State::Running && half.last().tick > 0 {
+            return half;
+        }
+    }
+    panic!("{:?}", half.status());
+}
+
+/// What is reported of an abort where a tick finds this number of places.
+fn aborted(clock: Clock, places: usize) -> (Vec<PassDigest>, usize) {
+    let mut half = running(clock);
+    let mut queue = Queue {
+        places,
+        events: Vec::new(),
+    };
+    half.obey(Instruction::Command(Command::Abort), &mut queue);
+    for _ in 0..2_000 {
+        queue.places = places;
+        tick(&mut half, &mut queue);
+    }
+    assert_eq!(half.last().state, State::Ready);
+    let passes = queue.events.iter().filter_map(|event| match event {
+        Event::Pass(pass) => Some(*pass),
+        _ => None,
+    });
+    let halts = queue
+        .events
+        .iter()
+        .filter(|event| matches!(event, Event::Halted(_)));
+    (passes.collect(), halts.count())
+}
+
+/// The journal takes a reported pass for complete until the end of its run is reported: a pass that was cut short is reported only with that end.
+#[test]
+fn a_pass_that_was_cut_short_is_reported_with_the_end_of_its_run_only() {
+    for places in 0..8 {
+        let (passes, halts) = aborted(Clock::Free, places);
+        assert_eq!(halts, places.min(1), "{places}");
+        assert!(passes.is_empty() || halts > 0, "{places}: {passes:?}");
+        assert_eq!(passes.len(), usize::from(places >= Queue::TICK_MAX), "{places}");
+    }
+    // In lockstep none is lost, whatever else the tick reports.
+    let (passes, halts) = aborted(Clock::Lockstep, Queue::TICK_MAX);
+    assert_eq!((passes.len(), halts), (1, 1));
 }
