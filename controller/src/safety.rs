@@ -287,8 +287,9 @@ impl Safety {
         holds
     }
 
-    /// Reports the start of a run.
+    /// Reports the start of a run. A spindle that a command has switched on is the run's now, and the link timeout the profile's.
     pub(crate) const fn begin_run(&mut self) {
+        self.heard(false);
         self.status.link_timed_out = false;
         self.status.pause = PauseCause::None;
     }

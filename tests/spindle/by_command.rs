@@ -2,7 +2,9 @@
 
 use controller::spindle::output;
 use interp_core::State;
-use protocol::message::{InputLines, PWM_STEPS, Reason, Request, Turning};
+use protocol::message::{
+    Configuration, InputLines, LinkTimeoutAction, PWM_STEPS, Reason, Request, SpindleOrder, Turning,
+};
 
 use super::{AT_SPEED, Desk, MAX_RPM, ON, with_contact};
 
@@ -101,4 +103,31 @@ fn a_coolant_switched_while_a_start_waits_is_that_of_its_run() {
     desk.ticks(2);
     desk.ask(&Request::Start).unwrap();
     assert_eq!(desk.outputs(), ON, "the start that was taken back is over");
+}
+
+/// A spindle that a command has switched on is the run's from its start on: the host is missed after the profile's time, and not after a second.
+#[test]
+fn a_spindle_by_command_does_not_shorten_the_link_timeout_of_the_run_after_it() {
+    let mut desk = Desk::ready();
+    let hold = Configuration {
+        on_link_timeout: LinkTimeoutAction::Hold,
+        link_timeout_ticks: 3_000,
+        ..Configuration::DEFAULT
+    };
+    desk.ask(&Request::Configure(hold)).unwrap();
+    desk.ask(&Request::Spindle(SpindleOrder::OFF)).unwrap();
+    desk.ask(&Request::Turn {
+        turning: Turning::Clockwise,
+        rpm: 6_000,
+    })
+    .unwrap();
+    desk.ask(&Request::Start).unwrap();
+    desk.ticks(2_500);
+    let status = desk.status();
+    assert!(
+        status.state.is_under_way() && !status.safety.link_timed_out,
+        "{status:?}"
+    );
+    desk.ticks(1_000);
+    assert!(desk.status().safety.link_timed_out);
 }
