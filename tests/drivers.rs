@@ -6,6 +6,9 @@ mod drive_enable;
 mod reset_cause;
 #[path = "../firmware/src/drivers/safety_inputs.rs"]
 mod safety_inputs;
+#[allow(unreachable_pub, reason = "in the firmware it is a resource that tasks share")]
+#[path = "../firmware/src/drivers/supply.rs"]
+mod supply;
 #[path = "../firmware/src/drivers/watchdog.rs"]
 mod watchdog;
 
@@ -15,10 +18,17 @@ use std::{
 };
 
 use boards::{Axis, BOARDS, Level, Pin, Port, Role};
-use controller::spindle::output;
+use controller::{
+    ram_flash::{OutOfBounds, RamFlash},
+    settings::Settings,
+    spindle::output,
+};
 use drive_enable::{DriveEnable, WritePorts};
-use protocol::message::{InputLines, ResetCause};
+use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
+use interp_core::SpanParameter;
+use protocol::message::{InputLines, Journal, ResetCause};
 use safety_inputs::{ReadPorts, SafetyInputs, pins_of};
+use supply::FallingRecord;
 use watchdog::{Register, Registers, Watchdog, reload};
 
 /// The independent watchdog as RM0090 describes it: keys, write protection, transfer of values to the LSI domain.
@@ -254,6 +264,88 @@ fn the_most_particular_cause_of_a_reset_counts() {
         for rest in [0, 0b11] {
             assert_eq!(reset_cause::cause(flags | rest), expected, "{flags:#x}");
             assert_eq!(reset_cause::cause(flags | reset_cause::TAKE_BACK), expected);
+        }
+    }
+}
+
+const SECTOR: usize = 4096;
+
+/// The sectors of the settings, which two drivers write; a byte that is not blank is not written again.
+#[derive(Clone, Default)]
+struct Sectors(Rc<RefCell<RamFlash<SECTOR>>>);
+
+impl ErrorType for Sectors {
+    type Error = OutOfBounds;
+}
+
+impl ReadNorFlash for Sectors {
+    const READ_SIZE: usize = 1;
+
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), OutOfBounds> {
+        self.0.borrow_mut().read(offset, bytes)
+    }
+
+    fn capacity(&self) -> usize {
+        2 * SECTOR
+    }
+}
+
+impl NorFlash for Sectors {
+    const WRITE_SIZE: usize = 1;
+    const ERASE_SIZE: usize = SECTOR;
+
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), OutOfBounds> {
+        self.0.borrow_mut().erase(from, to)
+    }
+
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), OutOfBounds> {
+        let mut before = vec![0; bytes.len()];
+        self.read(offset, &mut before)?;
+        assert!(before.iter().all(|byte| *byte == 0xff), "{offset} is not blank");
+        self.0.borrow_mut().write(offset, bytes)
+    }
+}
+
+/// The supply falls and comes back between any two steps in which the board prepares the journal's record, and again later.
+#[test]
+fn the_record_of_a_falling_supply_goes_to_a_blank_slot() {
+    const STEPS: u32 = 4;
+    let journal = |pass| Journal {
+        job: 1,
+        profile: 2,
+        pass,
+        is_finished: false,
+        path: SpanParameter::NONE,
+    };
+    for first in 0..3 * STEPS {
+        for second in first..3 * STEPS {
+            let sectors = Sectors::default();
+            let mut settings = Settings::open(sectors.clone());
+            let mut falling = FallingRecord::new(sectors.clone());
+            let (mut step, mut noted) = (0, 0);
+            for pass in 1..4 {
+                let mut dips = |falling: &mut FallingRecord<Sectors>| {
+                    if step == first || step == second {
+                        falling.changed(true);
+                        assert!(supply::lines() == InputLines::SUPPLY);
+                        falling.changed(false);
+                    }
+                    step += 1;
+                };
+                dips(&mut falling);
+                settings.keep_journal(&journal(pass)).unwrap();
+                noted = pass;
+                dips(&mut falling);
+                // As `GuardedMachine::prepare_journal` does.
+                let was_written = falling.withdraw();
+                dips(&mut falling);
+                let prepared = settings.prepare_journal(Some(&journal(10 + pass)), was_written);
+                falling.set(prepared);
+                dips(&mut falling);
+            }
+            // At the next power-up it is a record of that pass or later.
+            let found = Settings::open(sectors).journal().unwrap().pass;
+            assert!(found % 10 >= noted - 1, "{first}, {second}: {found}");
         }
     }
 }

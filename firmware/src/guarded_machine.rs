@@ -135,8 +135,9 @@ impl<M: Mutex<T = BoardRealTime>, F: Mutex<T = BoardFalling>> Machine for Guarde
     }
 
     fn prepare_journal(&mut self, journal: Option<&Journal>) {
-        // The supply may have come back before it was too low.
-        let was_written = self.falling.lock(FallingRecord::take_written);
+        // The supply may have come back before it was too low. It may also fall now: the record of before is not written to the slot that the next one is
+        // prepared for.
+        let was_written = self.falling.lock(FallingRecord::withdraw);
         let prepared = self.settings.prepare_journal(journal, was_written);
         self.falling.lock(|falling| falling.set(prepared));
     }

@@ -43,8 +43,9 @@ impl<F: NorFlash> FallingRecord<F> {
         self.prepared = prepared;
     }
 
-    /// Whether a record was written since the last call.
-    pub(crate) const fn take_written(&mut self) -> bool {
+    /// Withdraws the record: nothing is written until [`Self::set`]. Returns whether it was written already, so that its slot is not blank any more.
+    pub(crate) const fn withdraw(&mut self) -> bool {
+        self.prepared = None;
         core::mem::replace(&mut self.is_written, false)
     }
 
