@@ -189,8 +189,37 @@ fn the_start_button_needs_no_host() {
     bench = bench.cut(false);
     ticks(&mut bench, 100);
     press(&mut bench);
-    assert_eq!(bench.board.status().state, State::Ready);
+    assert_eq!(bench.board.status().state, State::Idle);
     assert_eq!(bench.board.status().samples, 0);
+}
+
+/// A stored job that may not start leaves the loaded one as it is.
+#[test]
+fn a_stored_job_that_may_not_start_does_not_replace_the_loaded_one() {
+    let (mut bench, job) = bench();
+    let prepared = prepare(&job).unwrap();
+    let mut home_nm = bench.home();
+    bench.load(&prepared, home_nm);
+    bench.ask(&Request::StoreJob {
+        name: name("elsewhere"),
+        begins_anywhere: false,
+    });
+    home_nm[2] += 1_000_000;
+    bench.ask(&Request::SetHome { home_nm });
+    bench.load(&prepared, home_nm);
+    let refusals = |reason: &Reason| matches!(reason, Reason::NotAtHome { .. });
+    assert!(refusals(&refused(&mut bench, &start("elsewhere", false))));
+    bench.ask(&Request::Drives { on: false });
+    for text in ["elsewhere", "left"] {
+        assert_eq!(refused(&mut bench, &start(text, false)), Reason::DrivesOff);
+    }
+    let (header, _) = bench.board.real_time().loaded().unwrap();
+    assert_eq!(header.axes.unwrap().home_nm, home_nm);
+    bench.ask(&Request::Drives { on: true });
+    bench.ask(&Request::SetHome { home_nm });
+    bench.ask(&Request::Start);
+    bench.run(100);
+    assert!(bench.board.status().state.is_under_way());
 }
 
 /// Nobody is missed either where the start waits for the spindle.

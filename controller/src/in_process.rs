@@ -174,6 +174,10 @@ impl<const WORDS: usize> Machine for Half<WORDS> {
         self.real_time.may_start()
     }
 
+    fn may_start_next(&mut self, home_nm: Option<[i32; 3]>) -> Result<(), Reason> {
+        self.real_time.may_start_next(home_nm)
+    }
+
     fn heard(&mut self) {
         self.real_time.heard();
     }

@@ -215,6 +215,12 @@ pub trait Machine {
     /// Why no run may start.
     fn may_start(&mut self) -> Result<(), Reason>;
 
+    /// [`crate::realtime::RealTime::may_start_next`].
+    ///
+    /// # Errors
+    /// Why no run of this job may start.
+    fn may_start_next(&mut self, home_nm: Option<[i32; 3]>) -> Result<(), Reason>;
+
     /// Reports a sign of life of the host: a request that the session answered.
     fn heard(&mut self);
 

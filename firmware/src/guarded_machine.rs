@@ -184,6 +184,10 @@ impl<M: Mutex<T = BoardRealTime>, F: Mutex<T = BoardFalling>> Machine for Guarde
         self.real_time.lock(|real_time| real_time.may_start())
     }
 
+    fn may_start_next(&mut self, home_nm: Option<[i32; 3]>) -> Result<(), Reason> {
+        self.real_time.lock(|real_time| real_time.may_start_next(home_nm))
+    }
+
     fn heard(&mut self) {
         self.real_time.lock(|real_time| real_time.heard());
     }

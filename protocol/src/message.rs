@@ -310,7 +310,8 @@ pub enum Request {
         /// Number of the job, from 0.
         index: u8,
     },
-    /// Loads a stored job, and starts it.
+    /// Loads a stored job, and starts it. The loaded job is replaced, also where the stored one is refused then: with words that are not those that were stored (`WrongDigest`), that
+    /// the core refuses (`Job`), a spindle beyond the profile (`OutOfRange`), or a full queue of commands (`Busy`).
     StartJob {
         /// Its name.
         name: JobName,
@@ -392,7 +393,7 @@ pub enum Reply {
         /// Number of the request.
         number: u16,
     },
-    /// Refused; nothing changed, unless stated at the reason.
+    /// Refused; nothing changed, unless stated at the reason or the request.
     Nak {
         /// Number of the request; [`NO_NUMBER`] where it could not be read.
         number: u16,

@@ -327,6 +327,10 @@ impl Machine for Mock {
         may_start(&self.status.safety)
     }
 
+    fn may_start_next(&mut self, _: Option<[i32; 3]>) -> Result<(), Reason> {
+        self.may_start()
+    }
+
     fn heard(&mut self) {
         self.heard += 1;
     }

@@ -78,21 +78,34 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
     /// The reason of the refusal: an input asserted or latched, the drives off, the machine not homed, or not at the start position; a job without limits on
     /// drives; a streamed job whose first rows are gone.
     pub fn may_start(&self) -> Result<(), Reason> {
+        self.may_start_from(self.interpolator.home_nm(), self.control.from_home)?;
+        if self.interpolator.can_start() {
+            Ok(())
+        } else {
+            Err(Reason::RowsGone)
+        }
+    }
+
+    /// Whether a run of a job may start that is loaded next; `home_nm`: the job's home, none where it has no limits.
+    ///
+    /// # Errors
+    /// As [`Self::may_start`].
+    pub fn may_start_next(&self, home_nm: Option<[i32; 3]>) -> Result<(), Reason> {
+        self.may_start_from(home_nm, true)
+    }
+
+    /// Whether inputs, drives and position let a run start at this home, or, where it need not, from where the axes stand.
+    fn may_start_from(&self, home_nm: Option<[i32; 3]>, from_home: bool) -> Result<(), Reason> {
         if self.control.manual.is_active() {
             return Err(Reason::Moving);
         }
         let status = self.control.safety.status();
         may_start(&status)?;
         let has_axes = self.control.has_drives && status.configuration.homing_required;
-        if has_axes && !self.interpolator.has_limits() {
-            return Err(Reason::NoLimits);
-        }
-        if !self.interpolator.can_start() {
-            return Err(Reason::RowsGone);
-        }
         let stands_nm = self.interpolator.stands_nm();
-        match self.interpolator.home_nm() {
-            Some(home_nm) if status.homed && self.control.from_home && stands_nm != Some(home_nm) => {
+        match home_nm {
+            None if has_axes => Err(Reason::NoLimits),
+            Some(home_nm) if status.homed && from_home && stands_nm != Some(home_nm) => {
                 Err(Reason::NotAtHome { home_nm, stands_nm })
             }
             _ => Ok(()),

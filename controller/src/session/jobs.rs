@@ -151,7 +151,7 @@ impl Session {
         Ok((start, spindle))
     }
 
-    /// Begins to load a stored job. Returns its spindle.
+    /// Begins to load a stored job, if it may start. Returns its spindle.
     #[inline(never)]
     fn begin_stored(&mut self, machine: &mut impl Machine, place: &JobPlace) -> Result<SpindleOrder, Reason> {
         let mut job = machine.jobs().job(place).ok_or(Reason::NoStoredJob)?;
@@ -160,6 +160,8 @@ impl Session {
         {
             axes.home_nm = machine.motion().at_nm;
         }
+        // Before the loaded job is replaced.
+        machine.may_start_next(job.header.axes.map(|axes| axes.home_nm))?;
         self.job_begin(machine, &job.header, job.words, job.digest)?;
         Ok(job.spindle)
     }
