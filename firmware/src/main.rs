@@ -10,8 +10,8 @@
 //!
 //! Tasks communicate through queues of fixed capacity with one writer and one reader. The
 //! machine itself is shared by `sample`, which gets it without a lock, `plan`, which locks it for the planning of a period, and `idle`, which locks
-//! it for one short call at a time ([`guarded_machine`]). The planning follows the sample that pended it, and takes 36 000 cycles (21 % of the period) at most, so
-//! that its lock delays a sample only where it is late, which is a fault. The record of a failing supply is shared by `supply` and `idle`, whose lock holds all tasks
+//! it for one short call at a time ([`guarded_machine`]). The planning follows the sample that pended it, and takes up to 38 600 cycles (23 % of the period;
+//! docs/limits.md), so that its lock delays a sample only where it is late, which is a fault. The record of a failing supply is shared by `supply` and `idle`, whose lock holds all tasks
 //! off for a copy of 44 bytes; the machine's lock does not hold off `receive`. The tool path is computed in
 //! `interp-core`; requests are handled in `controller`; board-specific code is in
 //! [`board`].
@@ -215,7 +215,7 @@ mod app {
     /// |---|---|
     /// | priority | 1: `receive` and `supply` interrupt it, and `sample` until it has locked the machine |
     /// | period | 1 ms, after the sample |
-    /// | worst case | 36 000 cycles, 21 % of the period; see `cargo sim budget` |
+    /// | worst case | 38 600 cycles, 23 % of the period, on the worst known job (docs/limits.md); see `cargo sim budget` |
     /// | a miss | the next sample is due before the end: counted, reported, and a fault of the run (`deadline-missed`), which stops along the path; in lockstep time waits |
     /// | a panic | cannot be reached: `firmware/no-panic` does not link otherwise |
     #[task(binds = EXTI0, priority = 1, shared = [real_time])]
@@ -265,7 +265,7 @@ mod app {
     /// |---|---|
     /// | priority | 0 |
     /// | period | none; woken by every interrupt |
-    /// | worst case | one frame's answer and its time on the line, 3.3 ms; a finished upload checks every record before its answer |
+    /// | worst case | one frame's answer and its time on the line, 3.3 ms; a finished upload checks every record before its answer; storing a job takes 0.3 s |
     /// | a miss | in lockstep time waits for it; on a free clock events are lost once their queue is full, and counted (`samples_lost`) |
     #[idle(
         shared = [real_time, falling],

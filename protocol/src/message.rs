@@ -246,7 +246,7 @@ pub enum Request {
     /// Keeps a profile beyond a power cut; none: forgets it. In force at once; the job has to be loaded again. Refused while a run is under way.
     SetProfile(Option<Profile>),
     /// Moves axes outside a job along a straight line, within the profile's limits, and within their travel once homed. Another one the same way keeps a continuous
-    /// jog going. `Hold`, `Stop` and `Abort` end it along its ramp.
+    /// jog going. `Hold`, `Pause`, `Stop` and `Abort` end it along its ramp.
     Jog {
         /// How far.
         way: JogWay,

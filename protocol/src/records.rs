@@ -30,20 +30,20 @@ pub const BOARD_NAME_MAX: usize = 24;
 /// Time base of the board.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Clock {
-    /// Every period of the sample timer is one step.
+    /// 0: every period of the sample timer is one step.
     #[default]
     Free,
-    /// Periods pass only while ticks granted by `Run` are left.
+    /// 1: periods pass only while ticks granted by `Run` are left.
     Lockstep,
 }
 
 /// Reports of a run to the host while it is under way.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Report {
-    /// One `PassDigest` per pass.
+    /// 0: one `PassDigest` per pass.
     #[default]
     Digests,
-    /// A `PassDigest` per pass, and every sample.
+    /// 1: a `PassDigest` per pass, and every sample.
     Samples,
 }
 
