@@ -535,3 +535,30 @@ fn names_and_colours() {
         (Some("sheet"), None)
     );
 }
+
+/// A file whose solids are inside out, their normals inwards and their loops the other way round, reads as the same faces.
+#[test]
+fn solids_inside_out_are_turned() {
+    let text = include_str!("../jobs/cad/lens_mould.step");
+    let flipped = |line: &str| {
+        if !line.contains("ADVANCED_FACE(") && !line.contains("FACE_BOUND(") {
+            return line.to_owned();
+        }
+        let (other, flag) = if line.ends_with(".T.);") {
+            (".T.);", ".F.);")
+        } else {
+            (".F.);", ".T.);")
+        };
+        line.replace(other, flag)
+    };
+    let inside_out: Vec<String> = text.lines().map(flipped).collect();
+    let inside_out = inside_out.join("\n");
+    assert_ne!(inside_out, text);
+    let [right, turned] = [text, &inside_out].map(|text| read_text("mould.step", text).unwrap());
+    assert_eq!(right.faces.len(), turned.faces.len());
+    for (right, turned) in right.faces.iter().zip(&turned.faces) {
+        assert!(right.solid);
+        assert_eq!(right.sense, turned.sense, "face {}", right.number);
+        assert_eq!(outline(right), outline(turned), "face {}", right.number);
+    }
+}

@@ -14,7 +14,7 @@ use cadmpeg_ir::{Codec, DecodeOptions};
 use crate::ir_geometry::{SURFACE_DEPTH_MAX, placement, point, solved_surface, vector};
 use crate::ir_index::{Translation, entity};
 use cad::Model;
-use cad::{Boundary, CadError, Face, Placement, Surface};
+use cad::{Boundary, CadError, Face, Placement, Solid, Surface};
 use cadmpeg_ir::document::CadIr;
 use glam::DVec3;
 
@@ -212,6 +212,37 @@ fn natural(id: &str) -> Vec<(u64, String)> {
     key
 }
 
+/// The faces of a body by their shells, and those of its copies.
+#[derive(Default)]
+struct BodyFaces<'m> {
+    shells: BTreeMap<&'m str, Vec<usize>>,
+    copies: Vec<usize>,
+}
+
+/// The solids of a file by their bodies.
+#[derive(Default)]
+struct Solids<'m>(BTreeMap<&'m str, BodyFaces<'m>>);
+
+impl<'m> Solids<'m> {
+    /// Adds a face of a shell of a copy of a body.
+    fn add(&mut self, body: &'m str, shell: &'m str, copy: usize, face: usize) {
+        let faces = self.0.entry(body).or_default();
+        if copy == 0 {
+            faces.shells.entry(shell).or_default().push(face);
+        } else {
+            faces.copies.push(face);
+        }
+    }
+
+    fn all(self) -> Vec<Solid> {
+        let solid = |faces: BodyFaces<'_>| Solid {
+            shells: faces.shells.into_values().collect(),
+            copies: faces.copies,
+        };
+        self.0.into_values().map(solid).collect()
+    }
+}
+
 impl<'m> Translation<'m> {
     /// All faces of all bodies, once per occurrence of their part; then surfaces without a face.
     fn model(&self, file: &str, stated: &dyn Stated) -> Result<Model, CadError> {
@@ -222,6 +253,7 @@ impl<'m> Translation<'m> {
         order.sort_by_cached_key(|face| natural(face.id.as_str()));
         let identity = vec![Placement::IDENTITY];
         let parts = self.names_of_parts();
+        let mut solids = Solids::default();
         for face in order {
             let body = shell_body.get(face.shell.as_str());
             let solid = body.is_some_and(|body| body.kind == BodyKind::Solid);
@@ -270,7 +302,7 @@ impl<'m> Translation<'m> {
             .flatten()
             .find(|text| !text.trim().is_empty())
             .map(|text| shortened(text.trim()));
-            for home in homes {
+            for (copy, home) in homes.iter().enumerate() {
                 if model.faces.len() >= FACES_MAX {
                     let what = format!("the file's assembly places more than {FACES_MAX} faces");
                     return Err(CadError::new(file, what, "export the part alone"));
@@ -283,6 +315,9 @@ impl<'m> Translation<'m> {
                     continue;
                 };
                 let turn = if home.mirrors() { -1.0 } else { 1.0 };
+                if let Some(body) = body.filter(|_| solid) {
+                    solids.add(body.id.as_str(), face.shell.as_str(), copy, model.faces.len());
+                }
                 model.faces.push(Face {
                     number: 0,
                     entity: name.clone(),
@@ -296,6 +331,7 @@ impl<'m> Translation<'m> {
                 });
             }
         }
+        model.solids = solids.all();
         self.lone_surfaces(&mut model, stated);
         model.warnings.truncate(WARNINGS_MAX);
         Ok(model)

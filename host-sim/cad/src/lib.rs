@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! file ──reader.rs──► Face: Surface (exact, mm, placed) + boundary      a separate program, `host-sim/cad-reader`
+//!                     │ orientation.rs the normals of a solid that is inside out are turned
 //!                     │ outline.rs     boundary -> a rectangle of (u, v), and whether the boundary is that rectangle
 //!                     │ plane.rs, edges/   parameters that suit the face, where those of the file do not
 //!                     ▼
@@ -27,6 +28,7 @@ mod invert;
 mod job;
 mod machinable;
 mod measure;
+mod orientation;
 mod outline;
 mod placement;
 mod plane;
@@ -49,6 +51,7 @@ pub use interpolation::interpolation_error_mm;
 pub use job::{FEED_MM_MIN, JobOptions, JobText, LIMITS, default_scallop_mm, machined_sign, write_job};
 pub use machinable::{Form, MachinableFace, Options, degrees, machinable};
 pub use measure::{Measures, measure};
+pub use orientation::Solid;
 pub use outline::{Outline, outline};
 pub use placement::Placement;
 pub use reader::{Model, read, read_once};
@@ -93,7 +96,7 @@ pub struct Face {
     pub boundary: Boundary,
     /// Sign of the normal of the face on `S_u x S_v`.
     pub sense: f64,
-    /// Whether it bounds a solid; its normal then points out of the material.
+    /// Whether it bounds a solid; its normal then points out of the material, unless the file has the solid inside out: [`read`] turns it.
     pub solid: bool,
 }
 

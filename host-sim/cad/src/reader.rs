@@ -9,7 +9,8 @@ use std::time::{Duration, Instant, SystemTime};
 
 use serde::{Deserialize, Serialize};
 
-use super::{CadError, Face};
+use super::orientation::turn_outwards;
+use super::{CadError, Face, Solid};
 use programs::{Part, Unavailable};
 
 /// Largest file, bytes; reading takes about 30 times the size of the file in memory.
@@ -22,6 +23,9 @@ const TIME_MAX: Duration = Duration::from_secs(300);
 pub struct Model {
     /// The faces, numbered from 1 in the order of the file.
     pub faces: Vec<Face>,
+    /// Which of them bound a solid.
+    #[serde(default)]
+    pub solids: Vec<Solid>,
     /// Entities that could not be read, as sentences.
     pub warnings: Vec<String>,
 }
@@ -147,6 +151,8 @@ fn run(file: &str, path: &Path, reader: &Path) -> Result<Model, CadError> {
         .join()
         .unwrap_or_else(|_| Err(std::io::ErrorKind::Other.into()))
         .map_err(failed)?;
-    serde_json::from_slice::<Result<Model, CadError>>(&text)
-        .unwrap_or_else(|_| Err(broken(format!("the reader failed on this file ({status})"))))
+    let mut model = serde_json::from_slice::<Result<Model, CadError>>(&text)
+        .unwrap_or_else(|_| Err(broken(format!("the reader failed on this file ({status})"))))?;
+    turn_outwards(&mut model.faces, &model.solids);
+    Ok(model)
 }

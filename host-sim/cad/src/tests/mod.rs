@@ -2,6 +2,7 @@
 
 mod aspect;
 pub(crate) mod fits;
+mod orientation;
 mod outlines;
 mod removal;
 mod splines;
