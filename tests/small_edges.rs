@@ -168,7 +168,7 @@ fn limits_hold_in_a_bend_of_many_patches() {
     }
 }
 
-/// Curvatures that jump so much that the tool has to rest: the offline solver finds no motion, the limits hold.
+/// Curvatures that jump so much that the tool has to rest: the limits hold.
 #[test]
 fn limits_hold_where_the_curvature_jumps() {
     for (name, radius, handles) in [

@@ -128,6 +128,12 @@ impl MaxSpeedProfile {
         fastest
     }
 
+    /// Largest speed at each arc length by the feed and the axis velocities alone, mm/s.
+    pub(super) fn speed_caps(&self, feed_mm_s: f64, limits: &AxisLimits) -> Vec<f64> {
+        let firsts = self.firsts.iter();
+        firsts.map(|first| limits.speed_cap(*first, feed_mm_s)).collect()
+    }
+
     fn step(&self, k: usize) -> f64 {
         self.arcs[k + 1] - self.arcs[k]
     }

@@ -26,10 +26,10 @@ const ROUNDS: usize = 5;
 const ABOVE: f64 = 3e-4;
 /// Share of the jerk limit in the ramps before the first node and after the last one.
 const END_JERK: f64 = 0.999;
-/// Duration of these ramps as a share of a ramp to the feed.
+/// Duration of these ramps as a share of a ramp to the largest speed.
 const END_SHARE: f64 = 0.02;
 /// Least number of intervals over a pass.
-const PASS_INTERVALS: f64 = 120.0;
+const PASS_INTERVALS: f64 = 160.0;
 /// Number of intervals over the distance in which the speed changes at ends and breaks.
 const RAMP: f64 = 40.0;
 /// Growth of the intervals away from ends and breaks, as a share.
@@ -132,6 +132,8 @@ struct SlowPoint {
     speed: f64,
     /// Path jerk there, mm/s^3.
     jerk: f64,
+    /// Speed up to which a ramp from there leads, mm/s.
+    ramp_mm_s: f64,
 }
 
 impl SlowPoint {
@@ -139,6 +141,18 @@ impl SlowPoint {
     fn speed_at(&self, arc: f64) -> f64 {
         let way = (arc - self.arc).abs();
         self.speed + 0.5 * self.jerk * (6.0 * way / self.jerk).powf(2.0 / 3.0)
+    }
+
+    /// The speed at which a ramp meets the largest speeds at these arc lengths, on the side where it is higher.
+    fn ramp_mm_s(&self, arcs: &[f64], caps: &[f64]) -> f64 {
+        let at = arcs.partition_point(|arc| *arc < self.arc);
+        let places = |k: usize| (self.speed_at(arcs[k]), caps[k]);
+        let met = |(ramp, cap): (f64, f64)| (ramp >= cap).then_some(cap);
+        let before = (0..at).rev().map(places).find_map(met);
+        let after = (at..arcs.len()).map(places).find_map(met);
+        let whole = [0, arcs.len() - 1].map(|k| self.speed_at(arcs[k]));
+        let most = before.into_iter().chain(after).fold(0.0, f64::max);
+        if most > 0.0 { most } else { whole[0].max(whole[1]) }
     }
 }
 
@@ -155,8 +169,11 @@ struct MotionSearch<'a> {
     period_s: f64,
     fastest: &'a MaxSpeedProfile,
     ends: [PassEnd; 2],
-    /// Path jerk of the ramps at the ends, mm/s^3.
+    /// Path jerk of the ramps at the ends, mm/s^3, and the speeds up to which they lead, mm/s.
     end_jerks: [f64; 2],
+    end_ramps_mm_s: [f64; 2],
+    /// Largest speed on the pass by feed, velocity and acceleration limits, mm/s.
+    speed_max_mm_s: f64,
     slow_points: Vec<SlowPoint>,
     steps: Vec<DerivativeStep>,
 }
@@ -175,6 +192,17 @@ fn path_jerk(first: DVec3, limits: &AxisLimits) -> f64 {
     })
 }
 
+/// The speed at which steps of the derivatives use half of a share of the jerk limits: the other half is for the ramps at them.
+fn step_speed(steps: [[f64; 3]; 2], limits: &AxisLimits, period_s: f64, share: f64) -> f64 {
+    (0..3).fold(f64::INFINITY, |least, axis| {
+        let [first, second] = [steps[0][axis], steps[1][axis]];
+        let half = 0.5 * share * limits.jerk_mm_s3[axis] * period_s;
+        least
+            .min(half * period_s / first)
+            .min((half / (0.75 * second)).sqrt())
+    })
+}
+
 impl<'a> MotionSearch<'a> {
     fn new(
         path: &'a PassPath<'a>,
@@ -188,13 +216,24 @@ impl<'a> MotionSearch<'a> {
         let breaks = path.breaks();
         let places = [(0, 0.0), (breaks.len() - 2, length)];
         let end_jerks = places.map(|(span, arc)| END_JERK * path_jerk(path.at(span, arc).first, limits));
-        let mut slow_points: Vec<SlowPoint> = (0..2)
-            .filter(|end| ends[*end] == PassEnd::Rest)
-            .map(|end| SlowPoint {
-                arc: places[end].1,
-                speed: 0.0,
-                jerk: end_jerks[end],
-            })
+        // From a slow point a ramp leads to where the feed or the velocity of an axis ends it.
+        let caps = fastest.speed_caps(feed_mm_s, limits);
+        let slow_point = |arc: f64, speed: f64, jerk: f64| {
+            let mut slow = SlowPoint {
+                arc,
+                speed,
+                jerk,
+                ramp_mm_s: 0.0,
+            };
+            slow.ramp_mm_s = slow.ramp_mm_s(&fastest.arcs, &caps);
+            slow
+        };
+        let end_points = [0, 1].map(|end| slow_point(places[end].1, 0.0, end_jerks[end]));
+        let end_ramps_mm_s = [0, 1].map(|end| end_points[end].ramp_mm_s);
+        let mut slow_points: Vec<SlowPoint> = end_points
+            .into_iter()
+            .zip(ends)
+            .filter_map(|(point, end)| (end == PassEnd::Rest).then_some(point))
             .collect();
         let mut steps = Vec::new();
         for (span, arc) in breaks.iter().enumerate().take(breaks.len() - 1).skip(1) {
@@ -204,14 +243,7 @@ impl<'a> MotionSearch<'a> {
                 arc: *arc,
                 steps: [of(before.first, after.first), of(before.second, after.second)],
             };
-            // Half of the jerk limit is reserved for the steps, the other half for the ramps at them.
-            let speed = (0..3).fold(f64::INFINITY, |least, axis| {
-                let [first, second] = [step.steps[0][axis], step.steps[1][axis]];
-                let half = 0.5 * limits.jerk_mm_s3[axis] * period_s;
-                least
-                    .min(half * period_s / first)
-                    .min((half / (0.75 * second)).sqrt())
-            });
+            let speed = step_speed(step.steps, limits, period_s, 1.0);
             let counts = (0..3).any(|axis| {
                 let jerk = step.steps[0][axis] * feed_mm_s / period_s.powi(2)
                     + step.steps[1][axis] * feed_mm_s * feed_mm_s / period_s;
@@ -219,11 +251,7 @@ impl<'a> MotionSearch<'a> {
             });
             if speed < feed_mm_s {
                 let jerk = path_jerk(before.first, limits).min(path_jerk(after.first, limits));
-                slow_points.push(SlowPoint {
-                    arc: *arc,
-                    speed,
-                    jerk,
-                });
+                slow_points.push(slow_point(*arc, speed, jerk));
             }
             if counts {
                 steps.push(step);
@@ -237,6 +265,8 @@ impl<'a> MotionSearch<'a> {
             fastest,
             ends,
             end_jerks,
+            end_ramps_mm_s,
+            speed_max_mm_s: fastest.squares.iter().copied().fold(0.0, f64::max).sqrt(),
             slow_points,
             steps,
         }
@@ -263,7 +293,7 @@ impl<'a> MotionSearch<'a> {
         }
         let jerk = self.end_jerks[end];
         // Limits the ramp to less than half of a short pass.
-        let rise = (self.feed_mm_s / jerk).sqrt();
+        let rise = (self.end_ramps_mm_s[end] / jerk).sqrt();
         let whole = (6.0 * self.path.length_mm() / jerk).cbrt();
         END_SHARE * rise.min(0.5 * whole)
     }
@@ -285,8 +315,8 @@ impl<'a> MotionSearch<'a> {
     fn interval_length(&self, arc: f64, known: Option<(&NodeGrid, &MotionProfile)>) -> f64 {
         let mut most = self.path.length_mm() / PASS_INTERVALS;
         let reach = |slow: &SlowPoint| {
-            // Twice the distance in which a ramp at constant jerk reaches the feed: the extent of speed changes.
-            let time = (2.0 * self.feed_mm_s / slow.jerk).sqrt();
+            // Twice the distance in which a ramp at constant jerk reaches its speed: the extent of speed changes.
+            let time = (2.0 * slow.ramp_mm_s / slow.jerk).sqrt();
             (slow.jerk * time.powi(3) / 3.0).min(self.path.length_mm())
         };
         for slow in &self.slow_points {
@@ -309,7 +339,7 @@ impl<'a> MotionSearch<'a> {
             // dv/ds = a / v
             for node in [k, k + 1] {
                 let slope = profile.accelerations[node].abs() / profile.squares[node].sqrt();
-                let largest = self.feed_mm_s;
+                let largest = self.speed_max_mm_s;
                 let floor = self.path.length_mm() * 1e-4;
                 if slope > 0.0 {
                     most = most.min((CHANGE * largest / slope).max(floor.min(most)));
@@ -372,7 +402,7 @@ impl<'a> MotionSearch<'a> {
     /// The fastest motion found.
     fn motion(&self) -> Result<FoundMotion, NoFeasibleMotion> {
         let coarse = self.grid(None);
-        let floor = LEAST * self.feed_mm_s.powi(2);
+        let floor = LEAST * self.speed_max_mm_s.powi(2);
         let guess: Vec<f64> = coarse
             .arcs
             .iter()
@@ -415,9 +445,26 @@ impl<'a> MotionSearch<'a> {
         best.ok_or(NoFeasibleMotion)
     }
 
+    /// Limits squared speeds where a period contains steps of the derivatives: linearised at a speed at which the steps alone use 1.5 times the jerk limit,
+    /// a programme has no solution.
+    fn limit_near_steps(&self, grid: &NodeGrid, squares: &mut [f64], floor: f64) {
+        for (k, interval) in grid.intervals.iter().enumerate() {
+            let speed = step_speed(
+                interval.steps,
+                self.limits,
+                self.period_s,
+                interval.limit_shares[1],
+            );
+            for square in &mut squares[k..=k + 1] {
+                *square = square.min(speed.powi(2).max(floor));
+            }
+        }
+    }
+
     /// Solves programme after programme, each linearised at the previous motion.
     fn improved(&self, grid: &NodeGrid, mut around: Vec<f64>) -> Result<MotionProfile, NoFeasibleMotion> {
-        let floor = LEAST * self.feed_mm_s.powi(2);
+        let floor = LEAST * self.speed_max_mm_s.powi(2);
+        self.limit_near_steps(grid, &mut around, floor);
         let mut best: Option<(f64, MotionProfile)> = None;
         for _ in 0..PROGRAMMES {
             let programme = Programme {

@@ -70,6 +70,59 @@ fn straight_passes_agree_with_the_closed_form() {
     assert!(worst <= 0.005, "{worst}");
 }
 
+/// The axes are slower than the feed, as far as 18 times: the motion is the one of a feed that they reach.
+#[test]
+fn feeds_above_the_velocity_limits_change_nothing() {
+    for (length, velocity, acceleration, jerk) in [
+        (6.0, 3.6, 625.0, 71_284.0),
+        (2.0, 2.0, 1000.0, 20_000.0),
+        (3.0, 10.0, 200.0, 1000.0),
+    ] {
+        let limits = AxisLimits {
+            velocity_mm_s: [velocity; 3],
+            acceleration_mm_s2: [acceleration; 3],
+            jerk_mm_s3: [jerk; 3],
+        };
+        let exact = LineLimits {
+            velocity,
+            acceleration,
+            jerk,
+        }
+        .rest_to_rest_s(length);
+        let path = line(length, DVec3::X);
+        for feed in [velocity, 18.4 * velocity] {
+            let time = found(&path, feed, &limits).feasible_s;
+            assert!((time / exact - 1.0).abs() <= 0.002, "{feed}: {time} for {exact}");
+        }
+    }
+}
+
+/// Around an edge of 0.2 mm the centre moves 16 times as fast as the contact, and its speed steps by these shares from span to span: the tool has to rest at
+/// the steps, and no motion was found where the first programme was linearised at a higher speed.
+#[test]
+fn passes_rest_at_steps_of_the_derivatives() {
+    let limits = AxisLimits::DEFAULT;
+    for speeds in [
+        &[1.0, 0.95, 1.05, 1.0, 0.97][..],
+        &[1.0, 0.9, 1.1, 0.95],
+        &[1.0, 1.0, 1.1, 1.0],
+    ] {
+        let breaks: Vec<f64> = (0..=speeds.len()).map(|k| 0.24 * k as f64).collect();
+        let path = PassPath::new(&breaks, |t| {
+            let span = breaks.partition_point(|at| *at <= t).clamp(1, speeds.len()) - 1;
+            let before: f64 = speeds[..span].iter().sum();
+            let (sin, cos) = (0.24 * before + speeds[span] * (t - breaks[span])).sin_cos();
+            CurvePoint {
+                cl_mm: 3.2 * DVec3::new(sin, 0.0, cos),
+                cl_velocity: 3.2 * speeds[span] * DVec3::new(cos, 0.0, -sin),
+                cc_speed: 0.2,
+            }
+        });
+        let found = found(&path, 60.0, &limits);
+        assert!(found.feasible_s < 0.7, "{speeds:?}: {found:?}");
+    }
+}
+
 /// Around a circle the speed is the least of the feed, sqrt(A R) and cbrt(J R^2).
 #[test]
 fn circles_run_at_their_limit_speed() {
