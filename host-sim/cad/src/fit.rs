@@ -348,6 +348,15 @@ fn interpolated(surface: &Surface, axes: [Axis; 2]) -> Result<SplineSurface, Fit
     })
 }
 
+/// The deviation of a surface with the same parameters, of which a pole is moved by at most `moved_mm`.
+pub(super) fn deviation_of_moved(surface: &Surface, fit: &SplineSurface, moved_mm: f64) -> Deviation {
+    let measured = deviation(surface, fit, DENSE);
+    Deviation {
+        max_mm: measured.max_mm.max(moved_mm),
+        ..measured
+    }
+}
+
 /// Largest distance and angle between a surface and its fit, at this many points per side of each patch of the fit.
 fn deviation(surface: &Surface, fit: &SplineSurface, each: usize) -> Deviation {
     let places = |k: usize| -> Vec<f64> {

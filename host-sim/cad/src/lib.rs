@@ -36,6 +36,7 @@ mod reader;
 mod remap;
 mod removal;
 mod spline;
+mod straight;
 mod surface;
 #[cfg(test)]
 mod tests;

@@ -3,10 +3,11 @@
 use super::aspect::with_even_patches;
 use super::edges::along_edges;
 use super::exact::exact;
-use super::fit::{Deviation, FitError, Knots, fit};
+use super::fit::{Deviation, FitError, Knots, deviation_of_moved, fit};
 use super::plane::suited;
 use super::removal::without_needless_knots;
 use super::spline::SplineSurface;
+use super::straight::straightened;
 use super::surface::Periodic;
 use super::trim::{Polygon, trim};
 use super::{CadError, Face, Outline, Surface, outline};
@@ -18,6 +19,9 @@ use patches::records::{patch_count, streamed_patch_count};
 const DEGREE_EXACT: usize = 3;
 /// Precision of a trimmed region's polygons, mm.
 const TRIM_MM: f64 = 0.002;
+
+/// Share of the tolerance for corners that are straightened.
+const CORNER_SHARE: f64 = 0.9;
 
 /// Options of an import.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -261,9 +265,9 @@ fn converted(
     rectangle: [[f64; 2]; 2],
     name: &str,
 ) -> Result<MachinableFace, CadError> {
-    let exactly = |nurbs: NurbsSpec, patches| MachinableFace {
+    let with_form = |nurbs: NurbsSpec, patches, form: &Form| MachinableFace {
         nurbs,
-        form: Form::Exact,
+        form: form.clone(),
         outline: outline.clone(),
         trimmed: None,
         patches,
@@ -273,7 +277,11 @@ fn converted(
     let mut why_fitted = "it has no exact form".to_owned();
     let mut larger = None;
     if let Some(spline) = exact(&face.surface, rectangle) {
-        let spline = without_needless_knots(&spline);
+        let (spline, form) = without_corners(
+            &face.surface,
+            without_needless_knots(&spline),
+            options.tolerance_mm,
+        );
         let degree = spline.axes.iter().map(|axis| axis.degree).max().unwrap_or(0);
         if degree <= DEGREE_EXACT {
             // Even patches where there is room for them.
@@ -281,8 +289,8 @@ fn converted(
                 let nurbs = nurbs(&spline);
                 let surface = centred(&nurbs);
                 match patch_count(&surface) {
-                    Ok(patches) => return Ok(exactly(nurbs, patches)),
-                    Err(why) => (why_fitted, larger) = (why, Some((nurbs, surface))),
+                    Ok(patches) => return Ok(with_form(nurbs, patches, &form)),
+                    Err(why) => (why_fitted, larger) = (why, Some((nurbs, surface, form.clone()))),
                 }
             }
         } else {
@@ -291,12 +299,27 @@ fn converted(
     }
     // What the store holds at once needs no host while it runs: a fit is taken before a larger surface.
     fitted(file, face, options, outline, rectangle, why_fitted, name).or_else(|error| {
-        let streamed = larger.and_then(|(nurbs, surface)| {
+        let streamed = larger.and_then(|(nurbs, surface, form)| {
             let patches = streamed_patch_count(&surface).ok()?;
-            Some(exactly(nurbs, patches))
+            Some(with_form(nurbs, patches, &form))
         });
         streamed.ok_or(error)
     })
+}
+
+/// The exact form of a B-spline with its corners of some arc minutes straightened, within the tolerance.
+fn without_corners(surface: &Surface, spline: SplineSurface, tolerance_mm: f64) -> (SplineSurface, Form) {
+    // The parameters of others are not those of their exact form.
+    let is_spline = matches!(surface, Surface::Spline(_));
+    let straight = is_spline.then(|| straightened(&spline, CORNER_SHARE * tolerance_mm));
+    let Some((straight, moved_mm)) = straight.flatten() else {
+        return (spline, Form::Exact);
+    };
+    let form = Form::Fitted {
+        why: "its pieces meet in small corners, which are straightened".to_owned(),
+        deviation: deviation_of_moved(surface, &straight, moved_mm),
+    };
+    (straight, form)
 }
 
 fn fitted(

@@ -91,13 +91,13 @@ fn removed(axis: &mut Axis, rows: &mut Vec<Vec<Pole>>, moved: &mut Vec<f64>, kno
 }
 
 /// `share` of the first row and the rest of the second.
-fn mixed(first: &[Pole], second: &[Pole], share: f64) -> Vec<Pole> {
+pub(super) fn mixed(first: &[Pole], second: &[Pole], share: f64) -> Vec<Pole> {
     let pole = |(a, b): (&Pole, &Pole)| std::array::from_fn(|k| share * a[k] + (1.0 - share) * b[k]);
     first.iter().zip(second).map(pole).collect()
 }
 
 /// How far a curve is moved where one row takes the place of the other, mm, at most.
-fn apart(first: &[Pole], second: &[Pole]) -> f64 {
+pub(super) fn apart(first: &[Pole], second: &[Pole]) -> f64 {
     let length = |p: &Pole| p[0].hypot(p[1]).hypot(p[2]);
     let each = first.iter().zip(second).map(|(a, b)| {
         let apart = length(&[a[0] - b[0], a[1] - b[1], a[2] - b[2], 0.0]);

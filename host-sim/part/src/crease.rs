@@ -5,9 +5,9 @@ use glam::DVec3;
 use job::Along;
 use oracle::{Derivatives, Surface};
 
-/// Largest jump of the ball's centre over which a pass may go, mm: within one period of 1 ms it takes all of the default acceleration limit of the z axis,
-/// half of that of x and y.
-const JUMP_MAX_MM: f64 = 0.0005;
+/// Largest jump of the ball's centre over which a pass may go, mm: twice of it over the third power of a period of 1 ms is all of the default
+/// jerk limit of the z axis, half of that of x and y. Jumps of files that are smooth but for rounding are below 1 nm.
+const JUMP_MAX_MM: f64 = 5e-6;
 /// Where the surface is evaluated below a knot, as a share of the range.
 const BELOW: f64 = 1e-9;
 /// Places at which each span of a knot line is looked at.

@@ -6,6 +6,7 @@ mod orientation;
 mod outlines;
 mod removal;
 mod splines;
+mod straight;
 mod surfaces;
 
 use std::f64::consts::{FRAC_PI_2, TAU};

@@ -16,12 +16,12 @@ fn polyline(slopes: &[f64]) -> (Face, oracle::Surface) {
 }
 
 /// A roof of two planes: each is a polygon of its own, that ends 10 um before the ridge. So it does beside a jump over which the ball's centre moves by
-/// 0.9 um; one by 0.3 um is passed.
+/// 9 nm; one by 3 nm is passed.
 #[test]
 fn a_region_is_cut_at_a_crease() {
     let tool = Tool::new(3.0, &ToolBody::default());
     let whole = |last: f64| vec![vec![[0.0, 0.0], [last, 0.0], [last, 1.0], [0.0, 1.0]]];
-    for (jump, is_cut) in [(0.2, true), (3e-4, true), (1e-4, false)] {
+    for (jump, is_cut) in [(0.2, true), (3e-6, true), (1e-6, false)] {
         let (face, surface) = polyline(&[-0.5 * jump, 0.5 * jump]);
         let made = region(&[face], &surface, &whole(2.0), &tool);
         assert_eq!(made.loops.len(), if is_cut { 2 } else { 1 }, "{jump}");
