@@ -2,6 +2,7 @@
 
 mod curved;
 mod interpreter;
+mod machine;
 
 use approach::export::{Dialect, ExportError, ExportedProgram, Options, export};
 use approach::gcode::FeedMode;
@@ -13,9 +14,10 @@ use programs::checkout;
 
 /// Rounding of a position: program and interpreter print four decimals each, with an error of half the last digit per axis, mm.
 const ROUNDED_MM: f64 = 1.8e-4;
+/// Dwell after the spindle is switched on, s.
+const RUN_UP_S: f64 = 2.5;
 /// Number of points checked on each cut.
 const PLACES: u32 = 8;
-const CLEARANCE_MM: f64 = 3.0;
 
 /// Tolerances of an approach: distance of a cut's ends and of its inner points from the exact path, mm; deviation of
 /// the contact's speed from the feed, as a fraction of it, on average over a cut and over an eighth of a cut.
@@ -134,7 +136,7 @@ fn check(job: &Job, options: &Options, bounds: &Bounds) -> ExportedProgram {
             Some(before) if steps_over(before, pass) && !is_tip(before) => {
                 check_step_over(job, before, pass, link)
             }
-            _ => check_plunge(link, exported.safe_z_mm),
+            _ => check_plunge(job, link, exported.safe_z_mm),
         }
         before = Some(pass);
         let (count, took) = follow(job, pass, &moves[next..], bounds);
@@ -147,7 +149,7 @@ fn check(job: &Job, options: &Options, bounds: &Bounds) -> ExportedProgram {
     let [retract] = moves[next..] else {
         panic!("moves after the last pass: {:?}", &moves[next..]);
     };
-    assert!(retract.rapid && exported.safe_z_mm >= highest + CLEARANCE_MM - ROUNDED_MM);
+    assert!(retract.rapid && exported.safe_z_mm >= highest + job.machine.clearance_mm - ROUNDED_MM);
     assert!(
         (time_s / exported.cutting_time_s - 1.0).abs() < 1e-4,
         "{time_s} s"
@@ -156,10 +158,10 @@ fn check(job: &Job, options: &Options, bounds: &Bounds) -> ExportedProgram {
 }
 
 /// Checks a link of retract, traverse and plunge, the last part of the plunge at the feed.
-fn check_plunge(link: &[Move], safe_z_mm: f64) {
+fn check_plunge(job: &Job, link: &[Move], safe_z_mm: f64) {
     let (plunge, rapids) = link.split_last().unwrap();
     assert!(!plunge.rapid && plunge.from[..2] == plunge.to[..2], "{plunge:?}");
-    assert!(plunge.from[2] >= plunge.to[2] + CLEARANCE_MM - ROUNDED_MM);
+    assert!(plunge.from[2] >= plunge.to[2] + job.machine.plunge_mm - ROUNDED_MM);
     for rapid in rapids {
         assert!(rapid.rapid);
         let crosses = rapid.from[..2] != rapid.to[..2];
@@ -219,8 +221,9 @@ fn check_step_over(job: &Job, before: &PassPath<'_>, pass: &PassPath<'_>, link: 
 
 /// Checks the restrictions of Grbl 1.1: length of its line buffer, set of words.
 fn check_grbl(program: &str) {
-    const WORDS: [&str; 15] = [
-        "G0", "G1", "G2", "G3", "G17", "G18", "G19", "G21", "G40", "G90", "G91.1", "G93", "G94", "M2", "M3",
+    const WORDS: [&str; 20] = [
+        "G0", "G1", "G2", "G3", "G17", "G18", "G19", "G21", "G40", "G90", "G91.1", "G93", "G94", "G4", "M2",
+        "M3", "M4", "M5", "M8", "M9",
     ];
     // Centres are relative to the start of the arc, whatever the program before this one has set.
     let first = program.lines().find(|line| line.starts_with('G'));
@@ -242,8 +245,8 @@ fn check_grbl(program: &str) {
             let word = &line[*start..starts.get(index + 1).copied().unwrap_or(line.len())];
             let number = word[1..].parse::<f32>();
             let known = match &word[..1] {
-                "G" | "M" => WORDS.contains(&word) || word == "M5",
-                letter => "XYZIJKFS".contains(letter),
+                "G" | "M" => WORDS.contains(&word),
+                letter => "XYZIJKFSP".contains(letter),
             };
             assert!(known && number.is_ok(), "{word} in {line}");
         }
@@ -255,8 +258,7 @@ fn options(dialect: Dialect, kind: Kind, feed_mode: FeedMode) -> Options {
         dialect,
         kind,
         feed_mode,
-        clearance_mm: CLEARANCE_MM,
-        spindle_rpm: None,
+        run_up_s: RUN_UP_S,
     }
 }
 
@@ -361,10 +363,8 @@ fn what_no_machine_could_follow_is_refused() {
         kind: Kind::Surface,
         ..plain
     };
-    assert_eq!(
-        export(&plate, &surface, &|| ()).unwrap_err(),
-        ExportError::SurfaceNeedsTheCore
-    );
+    let refused = export(&plate, &surface, &|| ()).unwrap_err();
+    assert!(matches!(refused, ExportError::SurfaceNeedsTheCore), "{refused:?}");
     let sides = [job::Side::Plus, job::Side::Minus];
     let faces_down = sides.map(|side| {
         plate.side = side;
@@ -374,18 +374,4 @@ fn what_no_machine_could_follow_is_refused() {
         faces_down[0] != faces_down[1],
         "one of the sides is the upper: {faces_down:?}"
     );
-}
-
-#[test]
-fn a_spindle_is_switched_on_and_off() {
-    let job = job("torus", 0.05);
-    let spinning = Options {
-        spindle_rpm: Some(12_000.0),
-        ..options(Dialect::Grbl, Kind::Linear, FeedMode::G94)
-    };
-    let text = export(&job, &spinning, &|| ()).unwrap().text;
-    let place = |what: &str| text.lines().position(|line| line == what).unwrap();
-    assert!(place("S12000M3") < place("M5") && place("M5") + 1 == place("M2"));
-    let silent = export(&job, &options(Dialect::Grbl, Kind::Linear, FeedMode::G94), &|| ()).unwrap();
-    assert!(!silent.text.contains("M3") && !silent.text.contains("M5"));
 }

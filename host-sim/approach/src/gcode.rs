@@ -107,6 +107,30 @@ impl Cut {
         }
     }
 
+    /// The position at a share of the way from its start, mm.
+    #[must_use]
+    pub fn at(&self, from_mm: DVec3, share: f64) -> DVec3 {
+        let mut at_mm = from_mm.lerp(self.to_mm, share);
+        let Shape::Arc {
+            plane,
+            centre_mm,
+            clockwise,
+        } = self.shape
+        else {
+            return at_mm;
+        };
+        let [first, second, _] = plane.axes();
+        let arm = |at: DVec3| [at[first] - centre_mm[first], at[second] - centre_mm[second]];
+        let (from, to) = (arm(from_mm), arm(self.to_mm));
+        let sense = if clockwise { -1.0 } else { 1.0 };
+        let outer = sense * (from[0] * to[1] - from[1] * to[0]);
+        let angle = sense * share * outer.atan2(from[0] * to[0] + from[1] * to[1]);
+        let (sine, cosine) = angle.sin_cos();
+        at_mm[first] = centre_mm[first] + from[0] * cosine - from[1] * sine;
+        at_mm[second] = centre_mm[second] + from[0] * sine + from[1] * cosine;
+        at_mm
+    }
+
     /// Duration, s.
     #[must_use]
     pub fn time_s(&self) -> f64 {
@@ -281,6 +305,24 @@ mod tests {
             text(FeedMode::G93, &lines),
             "G1X3Y-4F120\nZ0.12F5000\nX0Y0F121.48\n"
         );
+    }
+
+    #[test]
+    fn places_of_an_arc_are_on_its_circle() {
+        let from_mm = DVec3::new(5.0, 0.0, 0.0);
+        let arc = Cut {
+            to_mm: DVec3::new(0.0, -5.0, 2.0),
+            length_mm: 1.0,
+            speed_mm_s: 1.0,
+            shape: Shape::Arc {
+                plane: Plane::Xy,
+                centre_mm: DVec3::ZERO,
+                clockwise: true,
+            },
+        };
+        assert!(arc.at(from_mm, 1.0).distance(arc.to_mm) < 1e-12);
+        let half = 5.0 * std::f64::consts::FRAC_1_SQRT_2;
+        assert!(arc.at(from_mm, 0.5).distance(DVec3::new(half, -half, 1.0)) < 1e-12);
     }
 
     #[test]

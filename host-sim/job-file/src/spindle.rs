@@ -9,8 +9,6 @@ use crate::section::Section;
 const RPM_MAX: f64 = 1e6;
 /// Longest time from switching the spindle on to its speed, ms.
 const AT_SPEED_MAX_MS: f64 = 60_000.0;
-/// Default time from switching the spindle on to its speed, ms.
-const AT_SPEED_MS: f64 = 3000.0;
 
 /// Key of the contact that reports the speed.
 const AT_SPEED: &str = "at_speed_contact";
@@ -66,7 +64,7 @@ pub(super) fn read_drive(section: &Section<'_>) -> Result<SpindleDrive, JobError
         }
         value
     } else {
-        AT_SPEED_MS
+        job::AT_SPEED_DEFAULT_MS
     };
     Ok(SpindleDrive {
         max_rpm: rpm(section, "max_rpm")?.max(1),

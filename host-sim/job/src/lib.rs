@@ -14,7 +14,7 @@ pub mod units;
 
 pub use error::JobError;
 pub use machine::{
-    AXES, AxisLimits, CLEARANCE_DEFAULT_MM, Contact, HEARTBEAT_TIMEOUT_DEFAULT_MS,
+    AT_SPEED_DEFAULT_MS, AXES, AxisLimits, CLEARANCE_DEFAULT_MM, Contact, HEARTBEAT_TIMEOUT_DEFAULT_MS,
     HEARTBEAT_TIMEOUT_RANGE_MS, HeartbeatAction, Homing, MachineProfile, MachineSpec, PERIOD_DEFAULT_US,
     PERIOD_RANGE_US, Ratio, Spindle, SpindleDrive, StepOutput,
 };

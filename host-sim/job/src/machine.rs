@@ -130,6 +130,9 @@ pub enum Contact {
     NormallyOpen,
 }
 
+/// Default of the time from switching a spindle on to the first motion, ms.
+pub const AT_SPEED_DEFAULT_MS: f64 = 3000.0;
+
 /// The spindle of a machine.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpindleDrive {

@@ -1,6 +1,7 @@
 //! `export`: writes a job as G-code for another controller.
 
 use job::units::S_PER_MIN;
+use job::{AT_SPEED_DEFAULT_MS, Job, MachineProfile, Spindle};
 use std::path::PathBuf;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
@@ -8,7 +9,7 @@ use clap::{Args, ValueEnum};
 use serde_json::json;
 
 use super::out::say;
-use super::{Failure, Result, along, load, numbers, output_file, progress, spinner};
+use super::{Failure, Result, along, home, numbers, output_file, progress, read_profile, spinner};
 use approach::export::{Dialect, ExportError, Options, export};
 use approach::gcode::FeedMode;
 use approach::{Kind, passes};
@@ -37,10 +38,13 @@ pub(super) struct Arguments {
     /// Unit of the F words: G93 inverse time, or G94 mm/min.
     #[arg(long, value_enum, default_value = "g94")]
     feed_mode: FeedMode,
-    /// Clearance, mm: of the safe height above the highest cut, and of the start of a plunge above its cut.
-    #[arg(long, value_name = "MM", default_value_t = 5.0, value_parser = numbers::length, allow_negative_numbers = true)]
-    clearance: f64,
-    /// Switches the spindle on at this speed, rev/min.
+    /// Clearance of the safe height, mm, instead of the job's `clearance_mm`.
+    #[arg(long, value_name = "MM", value_parser = numbers::length, allow_negative_numbers = true)]
+    clearance: Option<f64>,
+    /// Machine profile (TOML): travel, and the time that the spindle needs to its speed (3 s without it).
+    #[arg(long, value_name = "FILE")]
+    machine: Option<PathBuf>,
+    /// Speed of the spindle, rev/min, instead of the job's.
     #[arg(long, value_name = "RPM", value_parser = numbers::rpm, allow_negative_numbers = true)]
     spindle: Option<f64>,
     /// Prints one JSON object instead of text.
@@ -61,6 +65,7 @@ impl From<ExportError> for Failure {
     fn from(error: ExportError) -> Self {
         match error {
             ExportError::Approach(error) => error.into(),
+            ExportError::Refused(error) => error.into(),
             ExportError::SurfaceNeedsTheCore => Self::input(
                 "G-code cannot represent a surface",
                 "export it with --approach linear or curve; the firmware runs it as a surface: cargo sim run",
@@ -73,16 +78,50 @@ impl From<ExportError> for Failure {
     }
 }
 
+/// Gives the job the clearance and the spindle's speed of the command line.
+fn override_machine(job: &mut Job, arguments: &Arguments) -> Result<()> {
+    if let Some(clearance_mm) = arguments.clearance {
+        if job.machine.safe_z_mm.is_some() {
+            let what = "--clearance and safe_z_mm: the job gives the safe height itself";
+            let remedy = "leave --clearance out, or remove safe_z_mm";
+            return Err(job.origin.error("machine.safe_z_mm", what, remedy).into());
+        }
+        job.machine.clearance_mm = clearance_mm;
+    }
+    if let Some(rpm) = arguments.spindle {
+        let own = job.machine.spindle.unwrap_or(Spindle {
+            rpm: 0,
+            counterclockwise: false,
+            coolant: false,
+        });
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "above 0; saturates"
+        )]
+        let rpm = rpm.round().max(1.0) as u32;
+        job.machine.spindle = Some(Spindle { rpm, ..own });
+    }
+    Ok(())
+}
+
+/// Time from switching the spindle on to the first motion, s.
+fn run_up_s(profile: Option<&MachineProfile>) -> f64 {
+    let drive = profile.and_then(|profile| profile.spindle);
+    1e-3 * drive.map_or(AT_SPEED_DEFAULT_MS, |drive| drive.at_speed_ms)
+}
+
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
-    let (job, _) = load(&arguments.job)?;
+    let profile = read_profile(arguments.machine.as_ref())?;
+    let (mut job, _) = home::load(&arguments.job, profile.as_ref(), None, None)?;
     super::whole_surface(&job, "export")?;
     output_file::check(&arguments.output, arguments.force)?;
+    override_machine(&mut job, arguments)?;
     let options = Options {
         dialect: arguments.format,
         kind: arguments.approach,
         feed_mode: arguments.feed_mode,
-        clearance_mm: arguments.clearance,
-        spindle_rpm: arguments.spindle,
+        run_up_s: run_up_s(profile.as_ref()),
     };
     let oracle = inspect::oracle(&job)?;
     let bar = if job.spacing.is_constant() {
@@ -107,6 +146,9 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
             "program_bytes": bytes,
             "cutting_time_s": exported.cutting_time_s,
             "safe_z_mm": exported.safe_z_mm,
+            "home_mm": job.machine.home_mm,
+            "spindle_rpm": job.machine.spindle.map(|spindle| spindle.rpm),
+            "warnings": exported.notes,
         });
         if let Some(keys) = value.as_object_mut() {
             keys.extend(along::json(&job));
@@ -126,5 +168,8 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         exported.cutting_time_s / S_PER_MIN
     );
     say!("  safe height  {:.4} mm", exported.safe_z_mm);
+    for note in &exported.notes {
+        say!("  warning: {note}");
+    }
     Ok(())
 }

@@ -17,6 +17,8 @@ fn has(told: &Value, names: &str, of: &str) {
             "s" => value.is_string(),
             "o" => value.is_object(),
             "o?" => value.is_object() || value.is_null(),
+            "a" => value.is_array(),
+            "a?" => value.is_array() || value.is_null(),
             "b" => value.is_boolean(),
             other => panic!("no kind {other}"),
         };
@@ -31,7 +33,8 @@ fn json_has_the_names_that_scripts_rely_on() {
     const FAULT: &str = "code:n name:s message:s tick:n pass:n u:n v:n";
     const VERIFY: &str = "position_error_max_nm:n normal_error_max_rad:n ripple_max_pct:n scallop_max_mm:n? scallop_mean_mm:n? \
         gouge_max_mm:n? limits:o? passed:b";
-    const EXPORT: &str = "approach:s along:s along_auto:o? feed_mode:s passes:n segments:n blocks:n program_bytes:n cutting_time_s:n safe_z_mm:n";
+    const EXPORT: &str = "approach:s along:s along_auto:o? feed_mode:s passes:n segments:n blocks:n program_bytes:n cutting_time_s:n safe_z_mm:n home_mm:a? \
+        spindle_rpm:n? warnings:a";
     const EXPLAIN: &str = "family:s code:n label:s name:s meaning:s value:s why:s remedy:s example:s";
     let folder = folder_with("torus", &[("along = \"u\"", "along = \"auto\"")]);
     for approach in ["constant-cl", "linear", "curve", "surface"] {

@@ -1,7 +1,7 @@
 //! Links between passes.
 
-use super::Options;
-use crate::gcode::{Blocks, Cut};
+use super::way::Writer;
+use crate::gcode::Cut;
 use crate::{ApproachError, from_segment};
 use glam::DVec3;
 use job::Job;
@@ -13,20 +13,54 @@ const CUTS_MAX: u32 = 1 << 12;
 /// Parts of a cut of a step-over between whose ends its chord error is evaluated.
 const PARTS: u32 = 8;
 
-/// Retract to the safe height.
-pub(super) fn retract(blocks: &mut Blocks<'_>, safe_z_mm: f64) {
-    blocks.rapid([None, None, Some(safe_z_mm)]);
+/// The heights and the home of a job's links.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Heights {
+    /// z of traverses between passes, mm.
+    pub(super) safe_z_mm: f64,
+    /// Where the program begins and ends; `None`: where the tool stands, and above the last pass.
+    pub(super) home_mm: Option<DVec3>,
 }
 
-/// Retract, traverse, rapid plunge to the clearance, plunge at the feed. On a surface that faces up everywhere, the ball is free
-/// above each of its contacts.
-pub(super) fn approach(blocks: &mut Blocks<'_>, to_mm: DVec3, safe_z_mm: f64, job: &Job, options: &Options) {
+impl Heights {
+    /// z of the ways from home and to it, mm: the tool does not go down before it is above the first pass.
+    fn from_home_mm(&self) -> f64 {
+        self.home_mm
+            .map_or(self.safe_z_mm, |home| home.z.max(self.safe_z_mm))
+    }
+
+    /// The way from home to the first pass, up to above it.
+    pub(super) fn leave_home(&self, writer: &mut Writer<'_>) {
+        if let Some(home) = self.home_mm {
+            writer.stands_at(home);
+            writer.rapid([None, None, Some(self.from_home_mm())]);
+            writer.rapid([Some(home.x), Some(home.y), None]);
+        }
+    }
+
+    /// Retract after the last pass, and the way home.
+    pub(super) fn go_home(&self, writer: &mut Writer<'_>) {
+        writer.rapid([None, None, Some(self.from_home_mm())]);
+        if let Some(home) = self.home_mm {
+            writer.rapid([Some(home.x), Some(home.y), None]);
+            writer.rapid([None, None, Some(home.z)]);
+        }
+    }
+}
+
+/// Retract, traverse, rapid plunge, and its last part, `plunge_mm`, at the feed. On a surface that faces up everywhere, the ball is free above each of its contacts.
+pub(super) fn approach(writer: &mut Writer<'_>, to_mm: DVec3, heights: &Heights, is_first: bool, job: &Job) {
     let [x, y, z] = to_mm.to_array();
-    let near = (z + options.clearance_mm).min(safe_z_mm);
-    retract(blocks, safe_z_mm);
-    blocks.rapid([Some(x), Some(y), None]);
-    blocks.rapid([None, None, Some(near)]);
-    blocks.cut(&Cut::line(DVec3::new(x, y, near), to_mm, job.feed_mm_s()));
+    let near = (z + job.machine.plunge_mm).min(heights.safe_z_mm);
+    let over = if is_first {
+        heights.from_home_mm()
+    } else {
+        heights.safe_z_mm
+    };
+    writer.rapid([None, None, Some(over)]);
+    writer.rapid([Some(x), Some(y), None]);
+    writer.rapid([None, None, Some(near)]);
+    writer.plunge(&Cut::line(DVec3::new(x, y, near), to_mm, job.feed_mm_s()));
 }
 
 /// Greatest distance of the ends of two curved passes between which the tool stays on the boundary, mm.

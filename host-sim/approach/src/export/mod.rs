@@ -2,20 +2,27 @@
 //!
 //! ```text
 //! job ─► oracle ─► PassPath ─► linear.rs or arcs.rs (approach/) ─► Cut ─┐
-//!                          └─► links.rs: retract, step-over ────────────┴─► gcode.rs: blocks ─► text
+//!                          └─► links.rs: home, retract, step-over ──────┴─► way.rs: is it clear? ─► gcode.rs: blocks ─► text
 //! ```
 //!
 //! The programmed point is the ball centre. The cuts are those of the approach; between passes the tool retracts (`zig`) or steps over
 //! along the boundary of the surface (`zigzag`). Both interpreters support lines and helical arcs; neither supports cubics in space, and
 //! LinuxCNC's NURBS are planar.
+//!
+//! Safe height, home, plunge and spindle are the job's. A program that would leave the travel, or touch stock or fixtures on its links, is refused.
 
+mod head;
 mod links;
+mod way;
 
 use crate::gcode::{Blocks, Cut, FeedMode};
 use crate::{ApproachError, Arcs, ConstantCl, Kind, Nodes, PassPath, even_chords, job_passes, side_curves};
 use glam::DVec3;
-use job::{Job, Pattern};
+use job::{Job, JobError, Pattern, Spindle};
+use links::Heights;
+use machine::prepare;
 use oracle::Oracle;
+use way::Writer;
 
 /// G-code dialect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -35,10 +42,8 @@ pub struct Options {
     pub kind: Kind,
     /// Unit of the F words.
     pub feed_mode: FeedMode,
-    /// Clearance of rapid moves above the highest CL and above the start of a plunge, mm.
-    pub clearance_mm: f64,
-    /// Spindle speed, rpm; `None`: the program contains no spindle command.
-    pub spindle_rpm: Option<f64>,
+    /// Dwell after the spindle is switched on, s.
+    pub run_up_s: f64,
 }
 
 /// An exported program.
@@ -54,13 +59,17 @@ pub struct ExportedProgram {
     pub cutting_time_s: f64,
     /// Safe height, mm.
     pub safe_z_mm: f64,
+    /// What the job asks for and the program does not do: a sentence each.
+    pub notes: Vec<String>,
 }
 
 /// Failure of an export.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Debug)]
 pub enum ExportError {
     /// The approach failed.
     Approach(ApproachError),
+    /// The program would not be safe, or not within the travel.
+    Refused(JobError),
     /// G-code cannot represent the approach.
     SurfaceNeedsTheCore,
     /// The surface faces down, so that the tool cannot retract.
@@ -138,13 +147,59 @@ pub fn export(job: &Job, options: &Options, done: &dyn Fn()) -> Result<ExportedP
         paths.push(Path::new(options.kind, job, &pass)?);
         done();
     }
-    let highest = paths.iter().map(|path| path.highest_mm);
-    let safe_z_mm = highest.fold(f64::NEG_INFINITY, f64::max) + options.clearance_mm;
+    let heights = heights(job, &paths)?;
     let mut text = String::new();
-    let mut blocks = Blocks::new(&mut text, options.feed_mode);
-    head(&mut blocks, job, options, paths.len());
+    let mut writer = Writer::new(Blocks::new(&mut text, options.feed_mode));
+    let notes = head::notes(job);
+    head::write(&mut writer.blocks, job, options, &heights, paths.len());
+    heights.leave_home(&mut writer);
+    write_passes(&mut writer, job, &oracle, &paths, &heights)?;
+    heights.go_home(&mut writer);
+    writer
+        .check(job, &oracle, heights.safe_z_mm)
+        .map_err(ExportError::Refused)?;
+    head::end(&mut writer.blocks, job, options);
+    let cuts = || paths.iter().flat_map(|path| &path.cuts);
+    Ok(ExportedProgram {
+        passes: paths.len(),
+        cuts: cuts().count(),
+        cutting_time_s: cuts().map(Cut::time_s).sum(),
+        safe_z_mm: heights.safe_z_mm,
+        notes,
+        text,
+    })
+}
+
+/// The job's safe height and home.
+fn heights(job: &Job, paths: &[Path]) -> Result<Heights, ExportError> {
+    let safe_z_mm = prepare::safe_z_mm(job);
+    let highest_mm = paths
+        .iter()
+        .map(|path| path.highest_mm)
+        .fold(f64::NEG_INFINITY, f64::max);
+    if safe_z_mm < highest_mm {
+        return Err(ExportError::Refused(job.origin.error(
+            "machine.safe_z_mm",
+            format!("the safe height, z = {safe_z_mm} mm, is below the highest cut, where the ball's centre is at z = {highest_mm:.4} mm"),
+            format!("raise safe_z_mm above {highest_mm:.4} mm, and above clamps and stock"),
+        )));
+    }
+    Ok(Heights {
+        safe_z_mm,
+        home_mm: job.machine.home_mm.map(DVec3::from),
+    })
+}
+
+/// The passes, and the links before each of them.
+fn write_passes(
+    writer: &mut Writer<'_>,
+    job: &Job,
+    oracle: &Oracle,
+    paths: &[Path],
+    heights: &Heights,
+) -> Result<(), ExportError> {
     let mut before: Option<&Path> = None;
-    for path in &paths {
+    for path in paths {
         let is_beside = |before: &&Path| {
             let ends = [before.ends[1], path.ends[0]];
             let centres = [before.end_mm, path.begin_mm];
@@ -153,63 +208,23 @@ pub fn export(job: &Job, options: &Options, done: &dyn Fn()) -> Result<ExportedP
         };
         match before.filter(is_beside) {
             Some(before) => {
-                let over = links::step_over(&oracle, [before.ends[1], path.ends[0]], job)?;
-                over.iter().for_each(|cut| blocks.cut(cut));
+                let over = links::step_over(oracle, [before.ends[1], path.ends[0]], job)?;
+                over.iter().for_each(|cut| writer.cut(cut));
             }
-            None => links::approach(&mut blocks, path.begin_mm, safe_z_mm, job, options),
+            None => {
+                writer.touch(false);
+                links::approach(writer, path.begin_mm, heights, before.is_none(), job);
+                writer.touch(true);
+            }
         }
-        path.cuts.iter().for_each(|cut| blocks.cut(cut));
+        path.cuts.iter().for_each(|cut| writer.cut(cut));
         before = Some(path);
     }
-    links::retract(&mut blocks, safe_z_mm);
-    if options.spindle_rpm.is_some() {
-        blocks.line("M5");
-    }
-    blocks.line("M2");
-    if options.dialect == Dialect::Linuxcnc {
-        blocks.line("%");
-    }
-    let cuts = || paths.iter().flat_map(|path| &path.cuts);
-    Ok(ExportedProgram {
-        passes: paths.len(),
-        cuts: cuts().count(),
-        cutting_time_s: cuts().map(Cut::time_s).sum(),
-        safe_z_mm,
-        text,
-    })
+    writer.touch(false);
+    Ok(())
 }
 
-fn head(blocks: &mut Blocks<'_>, job: &Job, options: &Options, passes: usize) {
-    if options.dialect == Dialect::Linuxcnc {
-        blocks.line("%");
-    }
-    let title = std::path::Path::new(job.origin.name())
-        .file_stem()
-        .map_or_else(|| "job".to_owned(), |name| name.to_string_lossy().into_owned());
-    // Grbl limits lines to 80 characters.
-    let title: String = title.chars().take(30).collect();
-    blocks.comment(&format!("{title}: {passes} passes, {}", options.kind.name()));
-    blocks.comment(&format!(
-        "ball of {} mm radius, programmed point: centre",
-        job.radius_mm
-    ));
-    let what = match options.kind {
-        Kind::ConstantCl => "CL feed",
-        _ => "CC feed",
-    };
-    blocks.comment(&format!(
-        "{what} {} mm/min, tolerance {} mm",
-        job.feed_mm_min, job.chord_mm
-    ));
-    // Centres of arcs are relative to their start (G91.1): a controller may have been left with absolute ones.
-    blocks.line("G17G21G40G90G91.1");
-    if options.dialect == Dialect::Linuxcnc {
-        // Path blending within the tolerance; naive CAM detector off, because it would join cuts of different feeds.
-        blocks.line(&format!("G64P{}Q0", job.chord_mm));
-    }
-    match options.spindle_rpm {
-        Some(rpm) => blocks.line(&format!("S{rpm}M3")),
-        None => blocks.comment("the spindle is not switched on by this program"),
-    }
-    blocks.line(options.feed_mode.word());
+/// The job's spindle where it turns.
+fn spindle(job: &Job) -> Option<Spindle> {
+    job.machine.spindle.filter(|spindle| spindle.rpm > 0)
 }

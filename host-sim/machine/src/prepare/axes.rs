@@ -7,6 +7,17 @@ use patches::placement::extent_mm;
 
 use super::geometry;
 
+/// z of the ball's centre on traverses, mm: the job's own, or its clearance above the highest point of the surface and of the whole part.
+#[must_use]
+pub fn safe_z_mm(job: &Job) -> f64 {
+    let machine = &job.machine;
+    let [_, _, [_, own_top]] = extent_mm(&job.surface);
+    let top = machine.part_top_mm.map_or(own_top, |top| top.max(own_top));
+    machine
+        .safe_z_mm
+        .unwrap_or(top + job.radius_mm + machine.clearance_mm)
+}
+
 /// Limits, travel and home of the axes; `None` for a job without limits. `start`: (u, v) at the start of the first pass.
 ///
 /// # Errors
@@ -16,11 +27,7 @@ pub(super) fn axes(job: &Job, tool_sign: f64, start: [f64; 2]) -> Result<Option<
     let Some(limits) = machine.limits else {
         return Ok(None);
     };
-    let [_, _, [_, own_top]] = extent_mm(&job.surface);
-    let top = machine.part_top_mm.map_or(own_top, |top| top.max(own_top));
-    let safe_z_mm = machine
-        .safe_z_mm
-        .unwrap_or(top + job.radius_mm + machine.clearance_mm);
+    let safe_z_mm = safe_z_mm(job);
     let home_mm = match machine.home_mm {
         Some(home_mm) => home_mm,
         // Above the start of the first pass, where the surface has a normal.

@@ -19,6 +19,7 @@ use interp_core::{Header, Pattern, RunStart, Spacing, StepConfig, SurfaceKind, T
 use job::{Along, AlongChoice, Job, JobError, StartChoice, SurfaceSpec};
 use patches::pieces::Source;
 
+pub use axes::safe_z_mm;
 pub(crate) use geometry::SurfaceEvaluator;
 pub use steps::{config as step_config, configuration};
 pub use stream::streamed;

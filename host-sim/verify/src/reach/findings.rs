@@ -91,6 +91,22 @@ impl ReachFinding {
         }
     }
 
+    /// What frees the part.
+    #[must_use]
+    pub fn remedy(&self) -> &'static str {
+        match (self.part, self.obstacle) {
+            (ToolPart::Ball, Obstacle::Surface) => {
+                "raise safe_z_mm, let turns overrun less (overrun_mm), or take a smaller ball"
+            }
+            (ToolPart::Ball, _) => "raise safe_z_mm, or move what is in the way",
+            (ToolPart::Holder(_), _) => "take a longer tool (length_mm) or a slimmer holder",
+            (_, Obstacle::Surface) => {
+                "take a slimmer shank, a longer neck or a larger ball, or turn the part"
+            }
+            (_, _) => "take a slimmer or longer tool, raise safe_z_mm, or move what is in the way",
+        }
+    }
+
     /// Depth, mm, if the part touches; else 0.
     #[must_use]
     pub fn touch_mm(&self) -> f64 {
@@ -189,22 +205,10 @@ fn sentence(job: &Job, finding: &ReachFinding) -> Option<String> {
             "reach: whether the {part} touches {obstacle} could not be measured: up to {:.4} mm near {at}",
             finding.bound_mm
         )),
-        Verdict::Violated => {
-            let remedy = match (finding.part, finding.obstacle) {
-                (ToolPart::Ball, Obstacle::Surface) => {
-                    "raise safe_z_mm, let turns overrun less (overrun_mm), or take a smaller ball"
-                }
-                (ToolPart::Ball, _) => "raise safe_z_mm, or move what is in the way",
-                (ToolPart::Holder(_), _) => "take a longer tool (length_mm) or a slimmer holder",
-                (_, Obstacle::Surface) => {
-                    "take a slimmer shank, a longer neck or a larger ball, or turn the part"
-                }
-                (_, _) => "take a slimmer or longer tool, raise safe_z_mm, or move what is in the way",
-            };
-            Some(format!(
-                "reach: the {part} is {:.4} mm deep in {obstacle} at {at}; {remedy}",
-                finding.depth_mm
-            ))
-        }
+        Verdict::Violated => Some(format!(
+            "reach: the {part} is {:.4} mm deep in {obstacle} at {at}; {}",
+            finding.depth_mm,
+            finding.remedy()
+        )),
     }
 }

@@ -65,14 +65,10 @@ pub fn measure(
     }
     progress.begin("reach", 0);
     let surface = SurfaceObstacle::new(oracle);
-    let between = PathTree::new(links(motion, CHORD_RADII * job.radius_mm));
     // The surface goes on where its face has ended; the whole part is checked elsewhere, face by face.
     let is_obstacle = job.origin.part().is_none();
-    if is_obstacle && !between.chords.is_empty() {
-        let shape = Shape::Ball(job.radius_mm);
-        let found = search(&surface, &between, &shape, floor(&shape));
-        let uv = found.deepest.map(|deepest| surface.parameters(&deepest.cell));
-        findings.push(finding(&shape, Obstacle::Surface, &found, uv));
+    if is_obstacle {
+        findings.extend(ball_between_passes(job, &surface, motion));
     }
     for solid in solids.iter().filter(|_| is_obstacle) {
         let shape = Shape::Solid(*solid);
@@ -80,9 +76,42 @@ pub fn measure(
         let uv = found.deepest.map(|deepest| surface.parameters(&deepest.cell));
         findings.push(finding(&shape, Obstacle::Surface, &found, uv));
     }
+    findings.extend(against_setup(job, &tree));
+    ReachResult::new(
+        job,
+        *contact,
+        facing(&oracle.surface, oracle.normal_sign),
+        merged(findings),
+    )
+}
+
+/// Measures the links of a motion: the ball against the surface between passes, the whole tool against stock and fixtures.
+#[must_use]
+pub fn measure_links(job: &Job, oracle: &Oracle, motion: &Motion) -> Vec<ReachFinding> {
+    let tree = PathTree::new(chords(motion, CHORD_RADII * job.radius_mm));
+    let mut findings = against_setup(job, &tree);
+    findings.extend(ball_between_passes(job, &SurfaceObstacle::new(oracle), motion));
+    merged(findings)
+}
+
+/// The ball against the surface between passes.
+fn ball_between_passes(job: &Job, surface: &SurfaceObstacle<'_>, motion: &Motion) -> Option<ReachFinding> {
+    let between = PathTree::new(links(motion, CHORD_RADII * job.radius_mm));
+    if between.chords.is_empty() {
+        return None;
+    }
+    let shape = Shape::Ball(job.radius_mm);
+    let found = search(surface, &between, &shape, floor(&shape));
+    let uv = found.deepest.map(|deepest| surface.parameters(&deepest.cell));
+    Some(finding(&shape, Obstacle::Surface, &found, uv))
+}
+
+/// The whole tool against stock and fixtures.
+fn against_setup(job: &Job, tree: &PathTree) -> Vec<ReachFinding> {
+    let mut findings = Vec::new();
     let shapes: Vec<Shape> = [Shape::Ball(job.radius_mm)]
         .into_iter()
-        .chain(solids.into_iter().map(Shape::Solid))
+        .chain(solids(job).into_iter().map(Shape::Solid))
         .collect();
     if let Some(block) = &job.setup.stock {
         let cleared = tree.part(true);
@@ -96,7 +125,7 @@ pub fn measure(
             // In contact, what is no wider than the ball is within what the ball clears.
             let is_wide = shape.widest() > job.radius_mm;
             let floor = floor(shape);
-            let found = search(&stock, if is_wide { &tree } else { &links }, shape, floor);
+            let found = search(&stock, if is_wide { tree } else { &links }, shape, floor);
             let mut finding = finding(shape, Obstacle::Stock, &found, None);
             // A column of the stock is found by its foot.
             finding.place_mm.z = block.high_mm[2];
@@ -105,15 +134,10 @@ pub fn measure(
     }
     for (number, fixture) in job.setup.fixtures.iter().enumerate() {
         for shape in &shapes {
-            findings.push(against(fixture, number, shape, &tree));
+            findings.push(against(fixture, number, shape, tree));
         }
     }
-    ReachResult::new(
-        job,
-        *contact,
-        facing(&oracle.surface, oracle.normal_sign),
-        merged(findings),
-    )
+    findings
 }
 
 /// The depth from which on a search goes into the matter. How far ball, neck and shank are from what they cut beside is no figure that anybody
