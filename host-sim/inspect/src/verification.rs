@@ -8,13 +8,13 @@ use job::{Job, units};
 use machine::prepare::Prepared;
 use machine::travel;
 use oracle::{AccuracyBounds, PassSample};
-use verify::EmittedSample;
 use verify::motion::{
     JobTimes, OptimumTimes, PassEnd, PeakMeter, Peaks, RunPass, TimeMeter, limits, optimum_times, times,
 };
 use verify::reach::{self, ContactPlace, ContactSide, Motion, ReachResult};
 use verify::survey::{SampleObserver, Survey, SurveyResult};
 use verify::swept::{self, Progress, ToolPath};
+use verify::{EmittedSample, Verdict};
 
 use crate::curved::{CurvedFigures, curved_figures};
 use crate::run::{PROGRESS_SAMPLES, machine, oracle};
@@ -109,6 +109,46 @@ pub struct Verification {
     pub warnings: Vec<String>,
 }
 
+/// Number of passes by a dense scan of the surface.
+#[derive(Clone, Copy, Debug)]
+struct ScannedPasses {
+    count: usize,
+    /// Least and greatest number where each step has the error that it may have.
+    within: [usize; 2],
+}
+
+impl ScannedPasses {
+    /// `None` where the oracle has no result.
+    fn new(oracle: &oracle::Oracle) -> Option<Self> {
+        let count = |factor: f64| oracle.schedule_scaled(factor).ok().map(|passes| passes.len());
+        let exact = count(1.0)?;
+        let ends =
+            [1.0 + BOUNDS.interval, 1.0 - BOUNDS.interval].map(|factor| count(factor).unwrap_or(exact));
+        Some(Self {
+            count: exact,
+            within: [ends[0].min(exact), ends[1].max(exact)],
+        })
+    }
+
+    /// The reason against a run of so many passes. Fewer are right where every crest between them is measured and within the limit: the scan takes the closest
+    /// step of its rule, which at skew ends of passes is shorter than the height asks for.
+    fn failure(&self, passes: usize, crests: Verdict) -> Option<String> {
+        let [least, most] = self.within;
+        let is_right = (least..=most).contains(&passes) || (passes < least && crests == Verdict::Met);
+        let remedy = if passes > most {
+            "the job is machined with more passes than its scallop height asks for"
+        } else {
+            "the scallop height is not shown to keep its limit with fewer"
+        };
+        (!is_right).then(|| {
+            format!(
+                "{passes} passes, but a dense scan of the surface needs {}: {remedy}",
+                self.count
+            )
+        })
+    }
+}
+
 /// What a verification computes and requires besides the bounds of every sample.
 #[derive(Clone, Copy, Default)]
 pub struct Requirements<'a> {
@@ -141,9 +181,10 @@ pub fn verify_run(
     // Curved passes are checked by the scallop height alone; those of a region line by line, because a line more or less may pass by a vertex or meet it.
     let scanned = match job.spacing.is_constant() || job.region.is_some() {
         true => None,
-        false => oracle(job)?.schedule().ok().map(|passes| passes.len()),
+        false => ScannedPasses::new(&oracle(job)?),
     };
     let failures = failures(job, timed, &measured, scanned);
+    let scanned = scanned.map(|scanned| scanned.count);
     let own = |warning: &&String| !failures.contains(warning);
     let mut warnings: Vec<String> = measured.swept.warnings.iter().filter(own).cloned().collect();
     warnings.extend(times::warning(&measured.times));
@@ -402,17 +443,17 @@ fn run_passes<'a>(
 }
 
 /// Reasons against the job, most severe first.
-fn failures(job: &Job, timed: &TimedRun, measured: &RunMeasurements, scanned: Option<usize>) -> Vec<String> {
+fn failures(
+    job: &Job,
+    timed: &TimedRun,
+    measured: &RunMeasurements,
+    scanned: Option<ScannedPasses>,
+) -> Vec<String> {
     let findings = &measured.findings;
     let mut failures: Vec<String> = timed.fault.iter().map(|fault| fault.sentence()).collect();
     failures.extend(findings.report.failures(&BOUNDS));
-    if let Some(scanned) =
-        scanned.filter(|scanned| *scanned != findings.passes as usize && timed.fault.is_none())
-    {
-        failures.push(format!(
-            "{} passes, but a dense scan of the surface needs {scanned}",
-            findings.passes
-        ));
+    if let Some(scanned) = scanned.filter(|_| timed.fault.is_none()) {
+        failures.extend(scanned.failure(findings.passes as usize, measured.swept.scallop_verdict));
     }
     failures.extend(measured.swept.failures.iter().cloned());
     failures.extend(measured.reach.failures.iter().cloned());
@@ -460,6 +501,43 @@ mod tests {
             }
             let whole = optimum.whole_ratio.unwrap();
             assert!((1.0..1.3).contains(&whole), "{whole}");
+        }
+    }
+
+    /// On a plane triangle the steps at the skew ends of passes, all exact, make one pass less than the scan asks for; every crest is within the limit.
+    #[test]
+    fn fewer_passes_within_the_limit_are_right() {
+        let text = "[surface]\nkind = \"nurbs\"\ndegree = [1, 1]\nknots_u = [0, 0, 1, 1]\nknots_v = [0, 0, 1, 1]\n\
+            poles_mm = [[[0, 0, 0], [0, 0, 0]], [[20, 0, 0], [20, 16, 0]]]\n[tool]\nkind = \"ball\"\nradius_mm = 3\n\
+            [cut]\nfeed_mm_min = 1800\nscallop_mm = 0.05\nalong = \"u\"\nside = \"up\"\npattern = \"zigzag\"\n\
+            [machine]\nvelocity_max_mm_s = [100, 100, 50]\n";
+        let job = job_file::parse("job.toml", text).unwrap();
+        let prepared = prepare(&job).unwrap();
+        let timed = time_run(&job, &prepared, &()).unwrap();
+        let found = verify_run(&job, &prepared, &timed, None, &Requirements::default(), &()).unwrap();
+        assert_eq!(found.failures, Vec::<String>::new());
+        assert_eq!((found.measured.findings.passes, found.scanned), (15, Some(16)));
+    }
+
+    #[test]
+    fn counts_of_passes_are_judged_within_the_error_of_a_step() {
+        let scanned = ScannedPasses {
+            count: 16,
+            within: [15, 16],
+        };
+        for (passes, crests, is_right) in [
+            (16, Verdict::Unknown, true),
+            (15, Verdict::Unknown, true),
+            (14, Verdict::Met, true),
+            (14, Verdict::Unknown, false),
+            (14, Verdict::Violated, false),
+            (17, Verdict::Met, false),
+        ] {
+            assert_eq!(
+                scanned.failure(passes, crests).is_none(),
+                is_right,
+                "{passes} {crests:?}"
+            );
         }
     }
 

@@ -54,17 +54,25 @@ impl Oracle {
     /// [`OracleError::BallDoesNotFit`] and [`OracleError::Degenerate`] at the first such point,
     /// [`OracleError::TooManyPasses`] if the intervals converge to 0.
     pub fn schedule(&self) -> Result<Vec<ScheduledPass>, OracleError> {
+        self.schedule_scaled(1.0)
+    }
+
+    /// [`Oracle::schedule`] with every step longer by this factor: the error that a step may have.
+    ///
+    /// # Errors
+    /// As [`Oracle::schedule`].
+    pub fn schedule_scaled(&self, factor: f64) -> Result<Vec<ScheduledPass>, OracleError> {
         if self.cells.len() < 2 {
-            return self.schedule_of_one();
+            return self.schedule_of_one(factor);
         }
         let mut passes = Vec::new();
         for index in 0..self.cells.len() {
-            passes.extend(self.of_cell(index).schedule_of_one()?);
+            passes.extend(self.of_cell(index).schedule_of_one(factor)?);
         }
         Ok(passes)
     }
 
-    fn schedule_of_one(&self) -> Result<Vec<ScheduledPass>, OracleError> {
+    fn schedule_of_one(&self, factor: f64) -> Result<Vec<ScheduledPass>, OracleError> {
         let [start, _] = self.pass_range();
         let end = self.last_line();
         let smooth = SmoothParameter::new(self, self.across());
@@ -82,7 +90,7 @@ impl Oracle {
                 Spacing::Exact | Spacing::Constant(_) => self.exact_interval(side, &before, &smooth)?,
             };
             steps.push(interval * scale);
-            let interval = self.beside_point(side, interval, smooth.distance(side, end));
+            let interval = factor * self.beside_point(side, interval, smooth.distance(side, end));
             let intervals = self.certain_intervals(side).into_iter();
             passes.extend(intervals.map(|ends| ScheduledPass { side, ends, interval }));
             if side >= end {
