@@ -5,7 +5,7 @@ use super::axes::AxisTravel;
 use super::gouge::GougeSearchResult;
 use super::original::OriginalDeviation;
 use super::ridge::{Crest, Gap, GapRidge, MISSED_RADII};
-use super::shape::SurfaceCheck;
+use super::shape::{ConcaveRadius, SurfaceCheck};
 use super::track::ToolPath;
 use crate::Verdict;
 use glam::DVec3;
@@ -29,6 +29,8 @@ const ACCEPTED_MARGIN: f64 = 1e-4;
 /// Every gouge deeper than this must be seen, mm, or than [`super::ERROR_SHARE_MAX`] of the scallop limit if that is more: ten times the
 /// position tolerance.
 const GOUGE_SEEN_MM: f64 = 1e-4;
+/// A ball with more than this share of the concave radius hardly fits: no contact is excluded from the search for gouges (see `gouge.rs`).
+const TIGHT_SHARE: f64 = 0.98;
 /// Rounding in f64, as a share of the coordinates: tens of operations of 1.1e-16 each.
 const ARITHMETIC: f64 = 1e-14;
 
@@ -138,6 +140,8 @@ pub struct SweptResult {
     pub gouge_floor_mm: f64,
     /// Upper bound of the depth at every point of the surface, mm; near contacts it assumes that the contacts are correct.
     pub gouge_bound_mm: f64,
+    /// Whether the search for gouges ended because the surface has too many cells.
+    pub gouge_cells_exhausted: bool,
     /// Ridges, one per gap, thinned to 100 000 points in total.
     pub ridges: Vec<Ridge>,
     /// Number of stations measured.
@@ -199,6 +203,7 @@ impl SweptResult {
             gouge: gouge(oracle, track, &parts.search),
             gouge_floor_mm: super::POSITION_MM + deviation_mm,
             gouge_bound_mm: parts.search.bound_mm,
+            gouge_cells_exhausted: parts.search.exhausted,
             ridges: thinned(oracle, parts),
             stations: parts.ridges.iter().map(|ridge| ridge.crests.len()).sum(),
             cells: parts.search.cells,
@@ -339,6 +344,33 @@ impl SweptResult {
         }
     }
 
+    /// Why gouges are not measured, and what makes them measurable.
+    pub(super) fn searching_remedy(&self, job: &Job) -> String {
+        let tight = |concave: &ConcaveRadius| job.radius_mm > TIGHT_SHARE * concave.radius_mm;
+        if self.gouge_floor_mm > self.gouge_seen_mm(job) {
+            "the samples are too far apart for the path's bends: lower the feed, or shorten period_us"
+                .to_owned()
+        } else if let Some(concave) = self
+            .shape
+            .concave_radius
+            .as_ref()
+            .filter(|concave| tight(concave))
+        {
+            format!(
+                "the ball hardly fits, with a concave radius of {:.4} mm at u = {:.6}, v = {:.6}: take a smaller ball",
+                concave.radius_mm, concave.u, concave.v
+            )
+        } else if self.gouge_cells_exhausted {
+            format!(
+                "the surface is too large for a ball of {} mm radius, after {} cells: divide it into jobs of smaller surfaces (ranges of u and v), or \
+                 take a larger ball",
+                job.radius_mm, self.cells
+            )
+        } else {
+            "a sharp fold of the surface: divide the job there".to_owned()
+        }
+    }
+
     fn failing(&self, job: &Job) -> Vec<String> {
         if !self.has_samples() {
             return vec!["nothing is measured: the run has no sample".to_owned()];
@@ -346,10 +378,10 @@ impl SweptResult {
         let mut failures: Vec<String> = self.scallop_failure(job).into_iter().collect();
         if self.gouge_verdict == Verdict::Unknown {
             failures.push(format!(
-                "gouges are not measured: searched only down to {:.6} mm, but all deeper than {:.6} mm must be seen; at too many points the ball \
-                 hardly fits: take a smaller ball",
+                "gouges are not measured: searched only down to {:.6} mm, but all deeper than {:.6} mm must be seen; {}",
                 self.gouge_bound_mm.max(self.gouge_floor_mm),
-                self.gouge_seen_mm(job)
+                self.gouge_seen_mm(job),
+                self.searching_remedy(job)
             ));
         }
         if let Some(gouge) = self.violating_gouge() {

@@ -19,8 +19,12 @@ use oracle::{Oracle, OracleError};
 
 /// Largest number of splits of a cell.
 const SPLITS_MAX: usize = 14;
-/// Largest number of cells evaluated.
-const CELLS_MAX: usize = 1_500_000;
+/// Largest number of cells evaluated: a number for any surface, more for one that is large beside the ball, whose cells are a share of its radius.
+const CELLS_MAX: usize = 3_000_000;
+const CELLS_PER_SQUARE_RADIUS: f64 = 600.0;
+const CELLS_CAP: usize = 24_000_000;
+/// Largest number of cells evaluated together, which bounds the memory.
+const BATCH_CELLS: usize = 1_500_000;
 /// Relative tolerance of the deepest gouge.
 const DEPTH_SHARE: f64 = 1e-3;
 /// Margin on the window that the curvature requires (see `reach`).
@@ -51,6 +55,16 @@ pub(super) struct GougeSearchResult {
     /// Upper bound of the depth at every point, mm.
     pub(super) bound_mm: f64,
     pub(super) cells: usize,
+    /// Whether the search ended because it had evaluated its largest number of cells.
+    pub(super) exhausted: bool,
+}
+
+/// Cells that are evaluated together.
+struct Batch {
+    cells: Vec<Cell>,
+    splits: usize,
+    /// Bound of the cells that they are parts of, mm.
+    bound_mm: f64,
 }
 
 pub(super) struct GougeSearch<'a> {
@@ -59,6 +73,12 @@ pub(super) struct GougeSearch<'a> {
     pub(super) grid: &'a CellGrid,
     /// Least depth that counts as a gouge, mm.
     pub(super) floor_mm: f64,
+}
+
+/// Takes the batch with the largest bound.
+fn take_highest(batches: &mut Vec<Batch>) -> Option<Batch> {
+    let highest = (0..batches.len()).max_by(|a, b| batches[*a].bound_mm.total_cmp(&batches[*b].bound_mm))?;
+    Some(batches.swap_remove(highest))
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -71,68 +91,102 @@ struct CellDepth {
 impl GougeSearch<'_> {
     /// Searches the deepest gouge; `done` is called with the number of cells evaluated.
     pub(super) fn search(&self, done: &(dyn Fn(u64) + Sync)) -> GougeSearchResult {
-        let mut deepest: Option<DeepestPoint> = None;
-        let mut cells: Vec<Cell> = (0..self.grid.count()).map(|k| self.grid.cell(k)).collect();
-        let mut evaluations = 0;
-        let mut left = self.floor_mm;
-        for round in 0..=SPLITS_MAX {
-            evaluations += cells.len();
-            let found = deepest.map_or(0.0, |deepest| deepest.depth_mm);
-            let evaluated: Vec<CellDepth> = cells
-                .par_iter()
-                .filter_map(|cell| {
-                    done(1);
-                    self.evaluate(*cell, self.closing_bound(found)).ok()
-                })
-                .collect();
-            for cell_depth in &evaluated {
+        let mut found = GougeSearchResult {
+            deepest: None,
+            bound_mm: self.floor_mm,
+            cells: 0,
+            exhausted: false,
+        };
+        let budget = self.budget();
+        let mut batches = vec![Batch {
+            cells: (0..self.grid.count()).map(|k| self.grid.cell(k)).collect(),
+            splits: 0,
+            bound_mm: self.oracle.radius_mm,
+        }];
+        while let Some(batch) = take_highest(&mut batches) {
+            // If the budget does not suffice for all cells, those with the largest bounds have been split; the bound of the others is reported.
+            if found.cells + batch.cells.len() > budget {
+                found.exhausted = true;
+                found.bound_mm = found.bound_mm.max(batch.bound_mm);
+                continue;
+            }
+            found.cells += batch.cells.len();
+            let mut open = self.evaluate_batch(&batch, &mut found, done);
+            open.sort_by(|a, b| a.depth.bound_mm.total_cmp(&b.depth.bound_mm));
+            if batch.splits == SPLITS_MAX {
+                let most = open.last().map_or(0.0, |cell| cell.depth.bound_mm);
+                found.bound_mm = found.bound_mm.max(most);
+                continue;
+            }
+            batches.extend(
+                open.chunks(self.batch_cells(budget - found.cells))
+                    .map(|open| Batch {
+                        cells: open.iter().flat_map(|cell| cell.cell.quarters()).collect(),
+                        splits: batch.splits + 1,
+                        bound_mm: open.last().map_or(0.0, |cell| cell.depth.bound_mm),
+                    }),
+            );
+        }
+        let depth_mm = found.deepest.map_or(0.0, |deepest| deepest.depth_mm);
+        found.bound_mm = found.bound_mm.max(self.closing_bound(depth_mm));
+        found
+    }
+
+    /// Number of open cells whose quarters make a batch: small enough for what is left of the budget.
+    fn batch_cells(&self, left: usize) -> usize {
+        (BATCH_CELLS.min(left / 8) / 4).max(1)
+    }
+
+    /// Largest number of cells evaluated.
+    fn budget(&self) -> usize {
+        let area = |index: usize| {
+            let cell = self.grid.cell(index);
+            let (u, v) = cell.middle();
+            let at = self.oracle.surface.at(u, v);
+            at.u.cross(at.v).length() * (cell.u[1] - cell.u[0]) * (cell.v[1] - cell.v[0])
+        };
+        let area_mm2: f64 = (0..self.grid.count()).map(area).sum();
+        let radius = self.oracle.radius_mm;
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
+        let by_area = (CELLS_PER_SQUARE_RADIUS * area_mm2 / (radius * radius)) as usize;
+        by_area.clamp(CELLS_MAX, CELLS_CAP)
+    }
+
+    /// Evaluates the cells of a batch, updates the deepest place, and returns the cells that have to be split.
+    fn evaluate_batch(
+        &self,
+        batch: &Batch,
+        found: &mut GougeSearchResult,
+        done: &(dyn Fn(u64) + Sync),
+    ) -> Vec<CellDepth> {
+        let depth_mm = found.deepest.map_or(0.0, |deepest| deepest.depth_mm);
+        let evaluated: Vec<CellDepth> = batch
+            .cells
+            .par_iter()
+            .filter_map(|cell| {
+                done(1);
+                self.evaluate(*cell, self.closing_bound(depth_mm)).ok()
+            })
+            .collect();
+        for cell_depth in &evaluated {
+            let least = found.deepest.map_or(self.floor_mm, |deepest| deepest.depth_mm);
+            if let Some(by) = cell_depth.depth.by
+                && cell_depth.depth.depth_mm > least
+            {
                 let (u, v) = cell_depth.cell.middle();
-                if let Some(by) = cell_depth.depth.by
-                    && cell_depth.depth.depth_mm > deepest.map_or(self.floor_mm, |deepest| deepest.depth_mm)
-                {
-                    deepest = Some(DeepestPoint {
-                        depth_mm: cell_depth.depth.depth_mm,
-                        u,
-                        v,
-                        point_mm: cell_depth.point_mm,
-                        by,
-                    });
-                }
+                found.deepest = Some(DeepestPoint {
+                    depth_mm: cell_depth.depth.depth_mm,
+                    u,
+                    v,
+                    point_mm: cell_depth.point_mm,
+                    by,
+                });
             }
-            let closing_bound = self.closing_bound(deepest.map_or(0.0, |deepest| deepest.depth_mm));
-            let mut open: Vec<&CellDepth> = evaluated
-                .iter()
-                .filter(|cell_depth| cell_depth.depth.bound_mm > closing_bound)
-                .collect();
-            let most = |open: &[&CellDepth]| {
-                open.iter()
-                    .map(|cell_depth| cell_depth.depth.bound_mm)
-                    .fold(closing_bound, f64::max)
-            };
-            left = most(&open);
-            if open.is_empty() || round == SPLITS_MAX {
-                break;
-            }
-            // If the budget does not suffice for all cells, those with the largest bounds are split; the bound of the others is reported.
-            let room = (CELLS_MAX.saturating_sub(evaluations)) / 4;
-            if open.len() > room {
-                open.sort_by(|a, b| b.depth.bound_mm.total_cmp(&a.depth.bound_mm));
-                left = most(&open[room..]);
-                open.truncate(room);
-                if open.is_empty() {
-                    break;
-                }
-            }
-            cells = open
-                .iter()
-                .flat_map(|cell_depth| cell_depth.cell.quarters())
-                .collect();
         }
-        GougeSearchResult {
-            deepest,
-            bound_mm: left,
-            cells: evaluations,
-        }
+        let closing_bound = self.closing_bound(found.deepest.map_or(0.0, |deepest| deepest.depth_mm));
+        let mut open = evaluated;
+        open.retain(|cell| cell.depth.bound_mm > closing_bound);
+        open
     }
 
     /// Bound below which a cell is not split.

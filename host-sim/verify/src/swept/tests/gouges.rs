@@ -97,7 +97,11 @@ fn gouge_of_a_part_is_held_to_its_tolerance() {
             "{:?}",
             found.gouge
         );
-        assert_eq!(found.gouge_verdict, verdict);
+        assert_eq!(
+            found.gouge_verdict, verdict,
+            "exact {exact}, bound {}, floor {}, {} cells",
+            found.gouge_bound_mm, found.gouge_floor_mm, found.cells
+        );
         let cuts = found.failures.iter().filter(|line| line.contains("cuts")).count();
         assert_eq!(cuts, usize::from(verdict == Verdict::Violated));
     }
@@ -126,4 +130,30 @@ fn left_out_samples_are_no_gouge() {
         assert_eq!(found.gouge_verdict, Verdict::Met, "{spacing_nm} nm");
         agrees(&found, exact);
     }
+}
+
+/// A surface of thousands of squares of the ball's radius has more cells than one of some hundreds; gouges were not measured, for the reason that "the ball hardly fits".
+#[test]
+fn a_small_ball_on_a_large_plane_is_measured() {
+    const SIDE_MM: f64 = 7.5;
+    let rail = |y: f64| [[0.0, 0.0, SIDE_MM, 0.0], [0.0, 0.0, 0.0, y], [0.0; 4]];
+    let surface = SurfaceSpec::Ruled {
+        rail0_mm: rail(0.0),
+        rail1_mm: rail(SIDE_MM),
+        u: [0.0, 1.0],
+        v: [0.0, 1.0],
+    };
+    let mut job = job(surface, Along::U, Side::Plus, 0.005);
+    job.radius_mm = 0.1;
+    let sides: Vec<f64> = (0..=125).map(|k| f64::from(k) / 125.0).collect();
+    let mut found = measured(&job, &sides, 100);
+    assert_eq!(found.gouge_verdict, Verdict::Met);
+    assert!(found.cells > 1_500_000, "{}", found.cells);
+    // The sentence names the size of the surface where that is the cause.
+    found.gouge_cells_exhausted = true;
+    let told = found.searching_remedy(&job);
+    assert!(
+        told.contains("too large for a ball of 0.1 mm") && !told.contains("hardly fits"),
+        "{told}"
+    );
 }
