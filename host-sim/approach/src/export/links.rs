@@ -24,7 +24,7 @@ pub(super) struct Heights {
 
 impl Heights {
     /// z of the ways from home and to it, mm: the tool does not go down before it is above the first pass.
-    fn from_home_mm(&self) -> f64 {
+    fn home_way_z_mm(&self) -> f64 {
         self.home_mm
             .map_or(self.safe_z_mm, |home| home.z.max(self.safe_z_mm))
     }
@@ -33,14 +33,14 @@ impl Heights {
     pub(super) fn leave_home(&self, writer: &mut Writer<'_>) {
         if let Some(home) = self.home_mm {
             writer.stands_at(home);
-            writer.rapid([None, None, Some(self.from_home_mm())]);
+            writer.rapid([None, None, Some(self.home_way_z_mm())]);
             writer.rapid([Some(home.x), Some(home.y), None]);
         }
     }
 
     /// Retract after the last pass, and the way home.
     pub(super) fn go_home(&self, writer: &mut Writer<'_>) {
-        writer.rapid([None, None, Some(self.from_home_mm())]);
+        writer.rapid([None, None, Some(self.home_way_z_mm())]);
         if let Some(home) = self.home_mm {
             writer.rapid([Some(home.x), Some(home.y), None]);
             writer.rapid([None, None, Some(home.z)]);
@@ -53,7 +53,7 @@ pub(super) fn approach(writer: &mut Writer<'_>, to_mm: DVec3, heights: &Heights,
     let [x, y, z] = to_mm.to_array();
     let near = (z + job.machine.plunge_mm).min(heights.safe_z_mm);
     let over = if is_first {
-        heights.from_home_mm()
+        heights.home_way_z_mm()
     } else {
         heights.safe_z_mm
     };
