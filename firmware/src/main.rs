@@ -10,7 +10,7 @@
 //!
 //! Tasks communicate through queues of fixed capacity with one writer and one reader. The
 //! machine itself is shared by `sample`, which gets it without a lock, `plan`, which locks it for the planning of a period, and `idle`, which locks
-//! it for one short call at a time ([`guarded_machine`]). The planning follows the sample that pended it, and takes up to 38 600 cycles (23 % of the period;
+//! it for one short call at a time ([`guarded_machine`]). The planning follows the sample that pended it, and takes up to 28 100 cycles (21 % of the period by the pessimistic model;
 //! docs/limits.md), so that its lock delays a sample only where it is late, which is a fault. The record of a failing supply is shared by `supply` and `idle`, whose lock holds all tasks
 //! off for a copy of 44 bytes; the machine's lock does not hold off `receive`. The tool path is computed in
 //! `interp-core`; requests are handled in `controller`; board-specific code is in
@@ -215,7 +215,7 @@ mod app {
     /// |---|---|
     /// | priority | 1: `receive` and `supply` interrupt it, and `sample` until it has locked the machine |
     /// | period | 1 ms, after the sample |
-    /// | worst case | 38 600 cycles, 23 % of the period, on the worst known job (docs/limits.md); see `cargo sim budget` |
+    /// | worst case | 28 100 cycles nominal, 36 000 pessimistic (21 % of the period), in the jobs of `docs/figures.md`; see `cargo sim budget` |
     /// | a miss | the next sample is due before the end: counted, reported, and a fault of the run (`deadline-missed`), which stops along the path; in lockstep time waits |
     /// | a panic | cannot be reached: `firmware/no-panic` does not link otherwise |
     #[task(binds = EXTI0, priority = 1, shared = [real_time])]

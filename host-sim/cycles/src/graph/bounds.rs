@@ -266,6 +266,16 @@ const BOUNDS: &[(&str, u32, &str)] = &[
     ),
     ("interp_core::feed::walk::speeds::cap", 3, "axes"),
     (
+        "interp_core::feed::walk::nodes::begin_busy",
+        168,
+        "stations: STATIONS_MAX",
+    ),
+    (
+        "interp_core::feed::newton::sweep::Sweep::jumps",
+        84,
+        "jumps of a plan: KNOTS_MAX",
+    ),
+    (
         "interp_core::feed::walk::nodes::find_busy",
         168,
         "stations: STATIONS_MAX",

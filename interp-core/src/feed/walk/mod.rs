@@ -34,6 +34,9 @@ const KNOTS_FOUND: u16 = 10;
 
 /// Cycles of a portion with no item.
 const PORTION_LEAST: u32 = 1_500;
+/// Cycles for a jump of the curvature, on top of the others.
+const BUSY_JUMP: u32 = 200;
+const KNOT: u32 = 750;
 /// Most stations.
 const STATIONS: u16 = 168;
 const _: () = assert!(STATIONS as usize == STATIONS_MAX);
@@ -187,7 +190,10 @@ impl Walker {
             Stage::Jumps => (20_000, [self.jumps, JUMPS_A_PORTION]),
             Stage::Rests => (12_000, [stations, STATIONS]),
             Stage::Backwards => (25_000, [stations, STATIONS]),
-            Stage::Busy => (14_000, [left(stations, BUSY_A_PORTION), BUSY_A_PORTION]),
+            Stage::Busy => (
+                8_500 + BUSY_JUMP * u32::from(self.jumps.min(BUSY_A_PORTION / 2)),
+                [left(stations, BUSY_A_PORTION), BUSY_A_PORTION],
+            ),
             Stage::Flatten => (17_000, [stations, STATIONS]),
             Stage::Forwards => (17_000, [left(stations, CELLS_A_PORTION), CELLS_A_PORTION]),
             Stage::TryEven | Stage::TryGrowing | Stage::Coarsen | Stage::Bisect(_) | Stage::Times => (
@@ -203,8 +209,10 @@ impl Walker {
                 15_000,
                 [left(self.intervals + 1, PLACES_A_PORTION), PLACES_A_PORTION],
             ),
-            Stage::Knots if self.jumps > 0 => (18_000, [KNOTS_A_PORTION, KNOTS_A_PORTION]),
-            Stage::Knots => (10_500, [left(self.intervals, KNOTS_A_PORTION), KNOTS_A_PORTION]),
+            Stage::Knots => (
+                10_500 + KNOT * u32::from(self.jumps.min(KNOTS_FOUND)),
+                [left(self.intervals, KNOTS_A_PORTION), KNOTS_A_PORTION],
+            ),
             Stage::Done => return 0,
         };
         let count = if plan.has_turn() { most } else { count.min(most) };
