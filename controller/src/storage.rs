@@ -2,7 +2,8 @@
 //!
 //! Two sectors, each divided into slots of [`SLOT`] bytes; a record takes as many slots as it needs. A record is appended to the active sector: sequence number, kind, payload,
 //! then a CRC-32; one that was not written to its end does not count. The active sector is that of the newest record. When it is full, the other sector becomes active, and
-//! begins with the next record and a copy of those in force, so that the full one can be erased whatever follows. Where there is no other, [`RESERVE`] is left blank. **An erase stops the processor for seconds**, so it happens at power-up only ([`Storage::open`]): then the spare sector is erased,
+//! begins with the next record and a copy of those in force, so that the full one can be erased whatever follows. Where there is no other, the last slot is left blank.
+//! **An erase stops the processor for seconds**, so it happens at power-up only ([`Storage::open`]): then the spare sector is erased,
 //! and a record in the active one says so. Without that record it is erased again, because an erase that was cut short may leave bits that read differently
 //! every time.
 //!

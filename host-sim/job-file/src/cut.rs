@@ -36,19 +36,19 @@ pub(super) struct CutSpec {
     pub(super) overrun_mm: f64,
 }
 
-/// Least scallop height and chord error, mm: positions are whole nanometres.
-const RESOLUTION_MM: f64 = 1e-6;
+/// Least scallop height and chord error, mm: far below the resolution of positions, and still no 0 in a job's header.
+const LEAST_MM: f64 = 1e-12;
 
 /// Reads `[cut]` for a ball.
 pub(super) fn read(cut: &Section<'_>, radius_mm: f64) -> Result<CutSpec, JobError> {
     cut.only(&KEYS, &[])?;
     let below_radius = |key: &str, remedy: &str| {
         let value = cut.number(key)?;
-        if value >= RESOLUTION_MM && value < radius_mm {
+        if value >= LEAST_MM && value < radius_mm {
             return Ok(value);
         }
-        let what = if value > 0.0 && value < RESOLUTION_MM {
-            format!("`{key}` must be at least {RESOLUTION_MM} mm, the resolution of positions, not {value:e}")
+        let what = if value > 0.0 && value < LEAST_MM {
+            format!("`{key}` must be at least {LEAST_MM:e} mm, not {value:e}")
         } else {
             format!("`{key}` must be above 0 and below the ball radius of {radius_mm} mm, not {value}")
         };

@@ -321,7 +321,7 @@ fn ranges() {
         (REVOLVED, "radius_mm = 10", "radius_mm = -inf", 10, 13, "must be a finite number"),
         (REVOLVED, "radius_mm = 10", "radius_mm = -1", 10, 13, "`radius_mm` must be above 0"),
         (REVOLVED, "scallop_mm = 0.005", "scallop_mm = 10", 14, 14, "below the ball radius of 10 mm, not 10"),
-        (REVOLVED, "scallop_mm = 0.005", "scallop_mm = 1e-300", 14, 14, "`scallop_mm` must be at least 0.000001 mm"),
+        (REVOLVED, "scallop_mm = 0.005", "scallop_mm = 1e-300", 14, 14, "`scallop_mm` must be at least 1e-12 mm"),
         (REVOLVED, "chord_mm = 0.005", "chord_mm = 0", 18, 12, "`chord_mm` must be above 0"),
         (REVOLVED, "chord_mm = 0.005", "spacing = \"constant\"\noverrun_mm = 2", 19, 14, "no turns beyond the boundary"),
         (REVOLVED, "chord_mm = 0.005", "overrun_mm = 2", 18, 14, "passes in one direction have no turns"),
