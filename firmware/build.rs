@@ -1,4 +1,4 @@
-//! Linker settings: an image for a boot loader begins behind it.
+//! Linker settings: an image for a boot loader begins after it.
 
 /// Flash that the SKR Pro's loader occupies, bytes: its sectors 0 and 1.
 const LOADER_BYTES: u32 = 32 * 1024;

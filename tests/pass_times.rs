@@ -166,7 +166,7 @@ fn straight_passes_take_the_time_of_the_exact_solution() {
 }
 
 /// Seven passes of each sample job, at the programmed feed, where the bound applies, and at three times that feed, where closely spaced knots
-/// cost more time (`docs/figures.md` has the values). Prints the table behind these figures, in some minutes:
+/// cost more time (`docs/figures.md` has the values). Prints the table from which these figures are, in some minutes:
 /// `cargo test --release -p integration-tests pass_times -- --ignored --nocapture`.
 #[test]
 #[ignore = "a campaign of minutes"]

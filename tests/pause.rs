@@ -98,7 +98,7 @@ fn a_run_that_begins_at_a_pass_has_the_same_passes() {
             let rest = ends(&part);
             assert!(part.iter().all(|sample| sample.pass >= first), "{name} {first}");
             assert_eq!(rest.len(), all.len() - first as usize, "{name} {first}");
-            // In a turn the first sample on a pass lies up to a period's way behind its start.
+            // In a turn the first sample on a pass lies up to a period's way after its start.
             let most = if job.overrun_mm > 0.0 { 60_000.0 } else { 2.0 };
             for (rest, all) in rest.iter().zip(&all[first as usize..]) {
                 for (rest, all) in rest.iter().zip(all) {
@@ -199,9 +199,9 @@ fn a_run_that_begins_within_a_pass_goes_on_along_it() {
             assert_eq!(first, pass[at], "{name}");
             // In front of a turn the last sample on a pass lies up to a period's way before its end, and with a rest there the others come closer to it.
             let end = pass[pass.len() - 1].cl_nm;
-            let is_behind =
+            let is_after =
                 |sample: &&Sample| job.overrun_mm == 0.0 || distance_nm(sample.cl_nm, end) > 60_000.0;
-            let deepest = deepest_nm(&pass, at, rest.iter().filter(is_behind));
+            let deepest = deepest_nm(&pass, at, rest.iter().filter(is_after));
             // The samples of the whole are joined by chords here: their height, and rounding.
             let chord = |three: &[Sample]| {
                 let bent = [0, 1, 2].map(|axis| {
@@ -410,10 +410,10 @@ fn a_pause_comes_back_to_the_same_sample() {
                 let same = path(&on_pass(&with_pause[back..])) == path(&on_pass(&with_hold[from..]));
                 assert!(same, "{name}: the rest of the pass");
             }
-            // The ways of the pause take planning from the passes behind it, so these may be slower; they are the same.
+            // The ways of the pause take planning from the passes after it, so these may be slower; they are the same.
             let (got, want) = (ends(&with_pause[back..]), ends(&with_hold[from..]));
             assert_eq!(got.len(), want.len(), "{name}: passes");
-            // In a turn the first sample on a pass lies up to a period's way behind its start.
+            // In a turn the first sample on a pass lies up to a period's way after its start.
             let most = if job.overrun_mm > 0.0 { 60_000.0 } else { 2.0 };
             for (got, want) in got.iter().zip(&want) {
                 for (got, want) in got.iter().zip(want) {

@@ -155,7 +155,7 @@ fn whole_jobs() {
     compare_prepared(&jobs);
 }
 
-/// Curved passes, whose stations lie in the store behind the job.
+/// Curved passes, whose stations lie in the store after the job.
 #[test]
 fn constant_scallop_height() {
     let constant = |name: &str, start| {

@@ -300,7 +300,7 @@ fn the_first_pass_is_planned_as_well_as_can_be() {
 }
 
 /// 120 surfaces of five kinds, 5 to 60 mm, at 10 to 100 mm/s, within the limits of `jobs/plate_machine.toml` and three times as much. Prints
-/// each pass and the table behind `docs/figures.md`, in a quarter of an hour; ISOFEED_CASES sets another number of surfaces of each
+/// each pass and the table of `docs/figures.md`, in a quarter of an hour; ISOFEED_CASES sets another number of surfaces of each
 /// kind, ISOFEED_FIRST leaves out those before it:
 /// `cargo test -p integration-tests random_passes -- --ignored --nocapture`.
 #[test]

@@ -263,7 +263,7 @@ impl Whole {
     fn again_mm(&self, cut: &Sample, resumed: RunStart) -> f64 {
         let arc = |pass, path| self.arc(pass, path);
         let at_cut = match cut.path {
-            // Off the passes: behind the last one.
+            // Off the passes: after the last one.
             SpanParameter::NONE => return self.length(resumed.pass) - arc(resumed.pass, resumed.path),
             path => arc(cut.pass, path),
         };
@@ -415,7 +415,7 @@ fn a_place_is_of_the_job_and_the_profile_that_ran() {
     check(bench, journal);
 }
 
-/// With a full journal a run is not noted: a place of an earlier one is none of it, and the new workpiece is not resumed behind passes that it never saw.
+/// With a full journal a run is not noted: a place of an earlier one is none of it, and the new workpiece is not resumed after passes that it never saw.
 #[test]
 fn a_run_that_a_full_journal_cannot_note_is_not_resumed_at_an_earlier_ones_place() {
     let job = sample_job("torus", Pattern::Zigzag, 0.0, None);

@@ -59,14 +59,14 @@ fn split_at(share: f64) -> Job {
         let (x, along) = (40.0 * i as f64 / 3.0, [0.0, 3.0, -2.0, 1.0][i]);
         let z = [1.0, -2.0, 3.0, 0.0].map(|across| along + across);
         let mut left: Vec<[f64; 4]> = (0..4).map(|j| [x, 40.0 * j as f64 / 3.0, z[j], 1.0]).collect();
-        // De Casteljau: the first of each round are the poles before the split, the last ones those behind it.
-        let (mut before, mut behind) = (vec![left[0]], vec![left[3]]);
+        // De Casteljau: the first of each round are the poles before the split, the last ones those after it.
+        let (mut before, mut after) = (vec![left[0]], vec![left[3]]);
         while left.len() > 1 {
             left = left.windows(2).map(|pair| mix(pair[0], pair[1])).collect();
             before.push(left[0]);
-            behind.push(left[left.len() - 1]);
+            after.push(left[left.len() - 1]);
         }
-        before.extend(behind.iter().rev().skip(1));
+        before.extend(after.iter().rev().skip(1));
         before
     };
     job.surface = SurfaceSpec::Nurbs(NurbsSpec {

@@ -1,7 +1,7 @@
 //! Random sequences of hold, resume, start, stop, abort and override, on hops, step-overs, turns and curves. The campaign of a million is a command of its
 //! own, `cargo run --release -p integration-tests --bin sequences -- 0 1000000`.
 
-use integration_tests::sequences::{Course, run, run_all};
+use integration_tests::sequences::{Trajectory, run, run_all};
 use interp_core::Command;
 
 /// Longest hold, periods of a millisecond.
@@ -9,7 +9,7 @@ const HOLD_MAX: usize = 400;
 
 #[test]
 fn no_sequence_of_commands_breaks_a_limit() {
-    let (outcome, errors) = run_all(&Course::all(), 0..400);
+    let (outcome, errors) = run_all(&Trajectory::all(), 0..400);
     println!("{outcome:?}");
     assert_eq!((outcome.count, errors), (400, Vec::<String>::new()));
     assert!(outcome.hold.0 <= HOLD_MAX, "{:?}", outcome.hold);
@@ -20,7 +20,7 @@ fn no_sequence_of_commands_breaks_a_limit() {
 /// And those that stood for 32 to 40 ms at the end of a pass where the slots of a stop on a pass never became shorter.
 #[test]
 fn the_longest_holds_and_stands_of_the_campaign() {
-    let courses = Course::all();
+    let courses = Trajectory::all();
     for seed in [
         731_760, 885_837, 400_901, 268_253, 282_779, 45_862, 395_624, 418_900,
     ] {
@@ -34,14 +34,14 @@ fn the_longest_holds_and_stands_of_the_campaign() {
 /// next sample was on the pass (one of 70 000 sequences).
 #[test]
 fn a_start_from_where_the_first_pass_begins() {
-    let outcome = Course::all()[1].start_again_from_the_first_pass().unwrap();
+    let outcome = Trajectory::all()[1].start_again_from_the_first_pass().unwrap();
     assert_eq!(outcome.count, 92);
 }
 
 /// Where the plan is near the feed, the tool moves at exactly that: a slower pace that relied on the plan's own jerk used 1.026 of the limit.
 #[test]
 fn a_slower_pace_from_the_feed() {
-    let course = Course::of_region(1, "[[0.1, 0.1], [0.9, 0.11], [0.9, 0.8], [0.1, 0.8]]");
+    let course = Trajectory::of_region(1, "[[0.1, 0.1], [0.9, 0.11], [0.9, 0.8], [0.1, 0.8]]");
     let outcome = course.pause_at_each_place().unwrap();
     assert!(outcome.count > 100, "{}", outcome.count);
 }
@@ -58,7 +58,7 @@ fn a_lower_override_does_not_make_the_next_plan_late() {
         (301, Some(Command::Resume), 200),
         (641, None, 100),
     ];
-    let course = &Course::all()[1];
+    let course = &Trajectory::all()[1];
     for wait in [560, 600, 620, 641, 660] {
         let mut steps = steps;
         steps[2].0 = wait;
@@ -74,7 +74,7 @@ fn a_lower_override_does_not_make_the_next_plan_late() {
 /// A hold near the end of a pass, resumed in any period around that end: the hop began at rest, and its pace was sought for 99 ms, though it can begin at any.
 #[test]
 fn a_resume_at_the_end_of_a_pass_is_followed_at_once() {
-    let course = &Course::all()[0];
+    let course = &Trajectory::all()[0];
     for wait in 30..45 {
         let steps = [(55, Some(Command::Hold), 100), (wait, Some(Command::Resume), 95)];
         let outcome = course.run_from(7959, &steps).unwrap();

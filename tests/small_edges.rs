@@ -28,10 +28,10 @@ struct Profile {
 }
 
 /// A place of a path of straight pieces and an arc: flat, around an edge of this radius by this angle, and down a slope.
-fn around([before, radius, angle, behind]: [f64; 4], along: f64) -> [f64; 2] {
+fn around([before, radius, angle, after]: [f64; 4], along: f64) -> [f64; 2] {
     let arc = radius * angle;
     let turned = ((along - before) / radius).clamp(0.0, angle);
-    let rest = (along - before - arc).clamp(0.0, behind);
+    let rest = (along - before - arc).clamp(0.0, after);
     [
         along.min(before) + radius * turned.sin() + rest * angle.cos(),
         -radius * (1.0 - turned.cos()) - rest * angle.sin(),
@@ -40,9 +40,9 @@ fn around([before, radius, angle, behind]: [f64; 4], along: f64) -> [f64; 2] {
 
 /// A spline whose poles lie on the path: smooth to the second derivative, its pieces as dense at the edge as elsewhere or `denser` times as dense.
 fn spline(shape: [f64; 4], pieces: usize, denser: f64) -> Profile {
-    let [before, radius, angle, behind] = shape;
+    let [before, radius, angle, after] = shape;
     let arc = radius * angle;
-    let whole = before + denser * arc + behind;
+    let whole = before + denser * arc + after;
     let place = |share: f64| {
         let at = share * whole;
         if at < before {
@@ -55,7 +55,7 @@ fn spline(shape: [f64; 4], pieces: usize, denser: f64) -> Profile {
     };
     let mut knots = vec![0.0; 4];
     knots.extend((1..pieces).map(|k| place(k as f64 / pieces as f64)));
-    knots.extend([before + arc + behind; 4]);
+    knots.extend([before + arc + after; 4]);
     let poles = (0..pieces + 3)
         .map(|k| around(shape, (knots[k + 1] + knots[k + 2] + knots[k + 3]) / 3.0))
         .collect();
@@ -83,8 +83,8 @@ fn fillet(radius: f64, angle: f64, handles: &[f64]) -> Profile {
     Profile { knots, poles }
 }
 
-/// A fillet behind `flats` straight pieces of a length.
-fn behind_flats(flats: usize, length: f64, fillet: &Profile) -> Profile {
+/// A fillet after `flats` straight pieces of a length.
+fn after_flats(flats: usize, length: f64, fillet: &Profile) -> Profile {
     let mut poles: Vec<_> = (0..3 * flats)
         .map(|k| [(k as f64 / 3.0 - flats as f64) * length, 0.0])
         .collect();
@@ -158,7 +158,7 @@ fn limits_hold_in_a_bend_of_many_patches() {
         (1.5, &[1.0, 1.1, 1.0, 0.9, 1.0, 1.1, 0.9, 1.0]),
     ] {
         let bend = fillet(radius, 0.3 * handles.len() as f64 / radius, handles);
-        let Used { shares, stand, .. } = used(&job(&behind_flats(38, 0.5, &bend)));
+        let Used { shares, stand, .. } = used(&job(&after_flats(38, 0.5, &bend)));
         println!("{radius} mm: {shares:.3?} of the limits, stands for {stand} periods");
         let [velocity, acceleration, jerk] = shares;
         assert!(
@@ -199,7 +199,7 @@ fn limits_hold_where_the_ball_hardly_fits() {
 /// Passes begin 14 um before a knot: cells of 2 um, over which derivatives are rounding, make the jumps at the other knots no less certain. They were left out: 4.25 of the jerk
 /// limit, on a face of a real part 1.48.
 #[test]
-fn limits_hold_behind_a_short_piece() {
+fn limits_hold_after_a_short_piece() {
     let text = include_str!("golden/hardly_fits.toml");
     let short = text.replace("[[0.02, 0.0], [0.98, 0.0],", "[[0.02, 0.295], [0.98, 0.295],");
     assert_ne!(short, text);

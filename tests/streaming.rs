@@ -95,7 +95,7 @@ impl<'a> Streamed<'a> {
         let mut outcome = Outcome::default();
         let mut digest = Digest::new();
         let mut command = Some(Command::Start);
-        let (mut waits, mut waits_behind) = (0, None);
+        let (mut waits, mut waits_after) = (0, None);
         loop {
             let sample = *self.core.tick(command.take());
             let is_starved = self.core.is_starved();
@@ -107,13 +107,13 @@ impl<'a> Streamed<'a> {
                 // Never in the cut: at rest within limits, else between two passes.
                 let is_at_rest = outcome.last.feed_mm_s == 0.0;
                 assert!(is_at_rest || !self.core.has_limits(), "{:?}", outcome.last);
-                waits_behind = Some(outcome.last.pass).filter(|_| !self.core.has_limits());
+                waits_after = Some(outcome.last.pass).filter(|_| !self.core.has_limits());
                 outcome.starved += 1;
                 waits += 1;
                 assert!(waits < 10_000, "it waits for ever: {:?}", self.core.load_room());
             } else {
                 waits = 0;
-                assert!(waits_behind.take().is_none_or(|pass| sample.pass == pass + 1));
+                assert!(waits_after.take().is_none_or(|pass| sample.pass == pass + 1));
                 digest.sample(&sample);
                 outcome.samples += 1;
                 outcome.last = sample;

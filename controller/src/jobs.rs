@@ -19,7 +19,7 @@ use crate::storage::StorageError;
 const HEAD: usize = 284;
 /// Bytes of a word.
 const WORD: u32 = 4;
-/// Bytes of the two words behind a job's.
+/// Bytes of the two words after a job's.
 const TAIL: u32 = 2 * WORD;
 /// Bytes of the CRC of a head.
 const CRC: usize = 4;
@@ -29,7 +29,7 @@ const _: () = assert!(BEGIN + STORED_JOB_BYTES_MAX + CRC == HEAD && HEAD.is_mult
 
 /// First word of a head.
 const MARK: u32 = 0x626f_6a31;
-/// The word behind the words of a job that was stored to its end.
+/// The word after the words of a job that was stored to its end.
 const WHOLE: u32 = 0x6c6c_6121;
 /// A word of erased flash.
 const BLANK: u32 = u32::MAX;
@@ -416,7 +416,7 @@ impl<F: NorFlash> JobStore<F> {
 
 /// What a walk through a sector has found.
 struct Walked {
-    /// Offset behind the last entry that was passed.
+    /// Offset after the last entry that was passed.
     end: u32,
     /// Greatest sequence number.
     newest: u32,

@@ -425,7 +425,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
     fn end_run(&mut self, events: &mut impl Events) {
         let interval = self.interpolator.last_interval();
         self.control.report_over(events);
-        // A pass that was cut short is reported only where the end of the run fits behind it, because the journal takes it for complete until then. In lockstep
+        // A pass that was cut short is reported only where the end of the run fits after it, because the journal takes it for complete until then. In lockstep
         // both fit.
         let over = self.control.run.end_pass(interval);
         if self.control.clock == Clock::Lockstep || events.has_room() {

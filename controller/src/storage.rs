@@ -40,7 +40,7 @@ const fn slots_of(payload: usize) -> usize {
 /// Slots left blank where there is no other sector: for a record that has to be written when the flash is full ([`Storage::keep_last`]).
 const RESERVE: u32 = 1;
 
-/// Blank slots behind which there is no record: one is left blank by a record that was prepared.
+/// Blank slots after which there is no record: one is left blank by a record that was prepared.
 const BLANK_SLOTS: u32 = 4;
 
 /// The value of erased flash.
@@ -110,7 +110,7 @@ enum Content {
 struct Active {
     /// 0 or 1.
     sector: u32,
-    /// The first slot behind its last record and all others that are not blank.
+    /// The first slot after its last record and all others that are not blank.
     next: u32,
     /// Sequence number of the newest record; 0 where there is none.
     sequence: u32,
@@ -252,7 +252,7 @@ impl<F: NorFlash> Storage<F> {
         }
         self.append(kind, payload)?;
         if is_full {
-            // A prepared record has the slot behind the first.
+            // A prepared record has the slot after the first.
             self.active.next += 1;
             self.carry_over_now();
         }
@@ -296,7 +296,7 @@ impl<F: NorFlash> Storage<F> {
         Ok(())
     }
 
-    /// A record for the slot behind the next one, because a record may be half written in the next one when it is needed. It counts as soon as its bytes are written, until the next
+    /// A record for the slot after the next one, because a record may be half written in the next one when it is needed. It counts as soon as its bytes are written, until the next
     /// record.
     /// None where there is no room. After it was written, [`Self::look_again`] has to be called.
     pub fn prepare(&self, kind: Kind, payload: &[u8]) -> Option<Prepared> {
@@ -373,7 +373,7 @@ impl<F: NorFlash> Storage<F> {
         sector * Self::SECTOR + slot * SLOT as u32
     }
 
-    /// The content of a slot, and of those behind it that belong to it.
+    /// The content of a slot, and of those after it that belong to it.
     fn slot(&mut self, sector: u32, slot: u32) -> Content {
         // Most slots are blank: a look at their head is enough, because it is written first.
         let mut head = [0; HEAD];
@@ -413,7 +413,7 @@ impl<F: NorFlash> Storage<F> {
         }
     }
 
-    /// A sector's newest record and next slot, as if it were the active one; behind this number of blank slots there is nothing.
+    /// A sector's newest record and next slot, as if it were the active one; after this number of blank slots there is nothing.
     #[inline(never)]
     fn look(&mut self, sector: u32, blank_slots: u32) -> Active {
         let mut active = Active {

@@ -64,7 +64,7 @@ impl Rows {
     fn take(&mut self, at: u32, word: i32) -> bool {
         let within = at
             .checked_sub(self.head)
-            .and_then(|behind| behind.checked_rem(self.words));
+            .and_then(|after| after.checked_rem(self.words));
         let left = self.words - within.unwrap_or(0);
         #[allow(clippy::cast_possible_truncation, reason = "2")]
         if within.is_some() && left <= DIGEST_WORDS as u32 {

@@ -1,6 +1,6 @@
 //! Random sequences of operator commands on passes within random regions.
 
-use integration_tests::sequences::{Course, Outcome, run_all};
+use integration_tests::sequences::{Outcome, Trajectory, run_all};
 use job::{AxisLimits, Side};
 use machine::Machine;
 use machine::links::{self, Link};
@@ -16,7 +16,7 @@ const LINKS: usize = 100;
 const PASSES: u32 = 3;
 
 /// The job of a random region with axis limits, and its undisturbed run. None of a region that holds no pass, or few, and of a run that ends in a fault.
-fn course(seed: u64, is_curved: bool) -> Option<Course> {
+fn course(seed: u64, is_curved: bool) -> Option<Trajectory> {
     let mut job = random_job(seed, is_curved);
     (job.machine.limits, job.side) = (Some(AxisLimits::DEFAULT), Side::Up);
     let (job, _) = machine::direction::choose(job).ok()?;
@@ -34,7 +34,7 @@ fn course(seed: u64, is_curved: bool) -> Option<Course> {
         println!("seed {seed}: {fault:?}");
     }
     (end.is_ok() && pass >= PASSES)
-        .then(|| Course::of(&format!("region {seed} {:?}", job.spacing), &prepared))
+        .then(|| Trajectory::of(&format!("region {seed} {:?}", job.spacing), &prepared))
 }
 
 /// Limits are kept, each pass ends where it does without commands, the tool never stands in contact, and each run comes to its end.

@@ -56,7 +56,7 @@ impl Random {
 /// A core with this job loaded.
 #[must_use]
 pub fn loaded(header: &Header, words: &[i32]) -> Core {
-    // Fronts lie behind the job.
+    // Fronts lie after the job.
     let spare = front_words(header).unwrap_or(0);
     let mut core = Interpolator::with_store(vec![0; words.len() + spare]);
     core.load_begin(header, u32::try_from(words.len()).unwrap())
@@ -85,7 +85,7 @@ struct Start {
 }
 
 /// A job, and places of its undisturbed run.
-pub struct Course {
+pub struct Trajectory {
     /// What it is.
     pub name: String,
     header: Header,
@@ -97,7 +97,7 @@ pub struct Course {
     is_short: bool,
 }
 
-impl Course {
+impl Trajectory {
     fn new(name: &str, header: Header, words: &[i32]) -> Self {
         let mut core = loaded(&header, words);
         let mut uses = Uses::default();
@@ -317,7 +317,7 @@ impl Outcome {
 
 /// A run under commands, with the state of its checks.
 struct Run<'a> {
-    course: &'a Course,
+    course: &'a Trajectory,
     core: Core,
     uses: Uses,
     last: Sample,
@@ -426,7 +426,7 @@ impl Run<'_> {
     }
 }
 
-impl Course {
+impl Trajectory {
     /// Runs steps from one of the places.
     fn run(&self, start: &Start, steps: &[Step]) -> Result<Outcome, String> {
         let mut run = Run {
@@ -512,7 +512,7 @@ impl Course {
 ///
 /// # Errors
 /// What it breaks.
-pub fn run(courses: &[Course], seed: u64) -> Result<Outcome, String> {
+pub fn run(courses: &[Trajectory], seed: u64) -> Result<Outcome, String> {
     let mut random = Random::new(seed);
     let course = &courses[random.below(courses.len())];
     let start = &course.starts[random.below(course.starts.len())];
@@ -561,7 +561,7 @@ impl Run<'_> {
 
 /// Runs the sequences of some seeds on all cores. Returns their outcome, and the broken rules in words.
 #[must_use]
-pub fn run_all(courses: &[Course], seeds: std::ops::Range<u64>) -> (Outcome, Vec<String>) {
+pub fn run_all(courses: &[Trajectory], seeds: std::ops::Range<u64>) -> (Outcome, Vec<String>) {
     use std::sync::Mutex;
     use std::sync::atomic::{AtomicU64, Ordering};
     let next = AtomicU64::new(seeds.start);

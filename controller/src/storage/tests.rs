@@ -7,7 +7,7 @@ use std::vec::Vec;
 const SLOTS: usize = 6;
 const SECTOR: usize = SLOTS * SLOT;
 
-/// Flash whose supply fails after a number of bytes written and halves of sectors erased: the one after that is done in part, those behind it not at all.
+/// Flash whose supply fails after a number of bytes written and halves of sectors erased: the one after that is done in part, those after it not at all.
 #[derive(Clone, Debug)]
 struct Failing {
     flash: RamFlash<SECTOR>,
@@ -87,7 +87,7 @@ fn the_newest_record_is_in_force() {
 #[test]
 fn without_a_power_up_there_is_room_for_two_sectors() {
     let mut storage = Storage::open(RamFlash::<SECTOR>::new());
-    // One is left blank behind the first record of a sector that has become active.
+    // One is left blank after the first record of a sector that has become active.
     for record in 0..2 * SLOTS - 2 {
         storage.keep(Kind::Profile, &[record as u8]).unwrap();
     }

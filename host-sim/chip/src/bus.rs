@@ -177,7 +177,7 @@ impl Surroundings for Chip {
         self.catch_up();
         let waits = self.nvic.has_pending() && self.is_deliverable(registers);
         if waits || self.reset.is_some() || self.over || self.hangs || self.fault || self.nvic.reset_wanted {
-            // The block is executed after the interruption, and its cycles are counted then. The time does not go back behind events that have occurred.
+            // The block is executed after the interruption, and its cycles are counted then. The time does not go back before events that have occurred.
             self.world.now = (self.world.now - u64::from(block.cycles)).max(self.happened);
             return false;
         }

@@ -80,7 +80,7 @@ fn words(kind: FaultKind) -> [&'static str; 5] {
         ],
         FaultKind::BadPatch => [
             "A patch's coefficients are outside the range in which its polynomials cannot overflow, its weights vary more than 4 : 1, or a boundary that is flagged as a point is not a point. Or the edges of the region are not in order, lie outside of the surface, are not closed, or are too many on one line.",
-            "The index of the patch, or behind the patches of eight edges of the region; in a run the pass before the line that meets too many edges.",
+            "The index of the patch, or after the patches of eight edges of the region; in a run the pass before the line that meets too many edges.",
             "The host scales every patch so that it passes the same check; a patch that the core refuses therefore comes from other software, or from a defect of the host tool.",
             "If the job came from `cargo sim`, please report it.",
             "An upload by a custom host, with coefficients near 2^31.",

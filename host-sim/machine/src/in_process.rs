@@ -85,7 +85,7 @@ impl Machine {
         self.core.fault().map_or(Ok(()), Err)
     }
 
-    /// Runs a streamed job to its end or a fault: the rows that each pass behind the first one needs.
+    /// Runs a streamed job to its end or a fault: the rows that each pass after the first one needs.
     pub(crate) fn rows_needed(&mut self) -> Vec<RowsNeeded> {
         let mut needed = Vec::new();
         let mut command = Some(Command::Start);

@@ -81,8 +81,8 @@ fn set(prepared: &mut Prepared, words: &[i32], count: u16) {
     if prepared.header.window > 0 {
         return stream::set_links(prepared, words, count);
     }
-    let behind = prepared.words.len() - usize::from(prepared.header.links);
-    prepared.words.truncate(behind);
+    let after = prepared.words.len() - usize::from(prepared.header.links);
+    prepared.words.truncate(after);
     prepared.words.extend(words);
     prepared.header.links = count;
 }

@@ -99,11 +99,11 @@ impl Oracle {
             // Lines without an interval are left out; where the line meets nothing at all, the region begins again.
             let mut next = side;
             loop {
-                let behind = smooth.advanced(next, interval * scale / smooth.scale(next));
-                if behind <= next {
+                let beyond = smooth.advanced(next, interval * scale / smooth.scale(next));
+                if beyond <= next {
                     return Err(OracleError::TooManyPasses);
                 }
-                next = behind;
+                next = beyond;
                 if end - next <= BOUNDARY_SHARE * interval {
                     next = end;
                 }

@@ -75,12 +75,12 @@ impl SmoothParameter {
         (span.start + (place - span.place) / span.scale, span.scale)
     }
 
-    /// Change of the smooth parameter per unit of the own at a place; at a knot, behind it.
+    /// Change of the smooth parameter per unit of the own at a place; at a knot, after it.
     pub(super) fn scale(&self, at: f64) -> f64 {
         self.span(|span| span.start <= at).scale
     }
 
-    /// The place at a distance behind another; in units of the own parameter there.
+    /// The place at a distance after another; in units of the own parameter there.
     pub(super) fn advanced(&self, from: f64, distance: f64) -> f64 {
         let span = self.span(|span| span.start <= from);
         let to = from + distance;

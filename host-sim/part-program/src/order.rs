@@ -58,8 +58,8 @@ impl FaceLinks {
     /// The time of the links from one face through others to a last one, s.
     fn way_s(&self, from: usize, through: &[usize], to: usize) -> f64 {
         let before = std::iter::once(from).chain(through.iter().copied());
-        let behind = through.iter().copied().chain([to]);
-        before.zip(behind).map(|(from, to)| self.time_s(from, to)).sum()
+        let after = through.iter().copied().chain([to]);
+        before.zip(after).map(|(from, to)| self.time_s(from, to)).sum()
     }
 
     /// The order of all faces.
@@ -127,11 +127,11 @@ impl FaceLinks {
         change: impl FnOnce(&mut [usize]),
     ) -> bool {
         let before = from.checked_sub(1).map_or(self.home(), |before| order[before]);
-        let behind = order.get(to).copied().unwrap_or(self.home());
+        let after = order.get(to).copied().unwrap_or(self.home());
         let now = &mut order[from..to];
         let mut new = now.to_vec();
         change(&mut new);
-        let saves = self.way_s(before, &new, behind) + SAVED_MIN_S < self.way_s(before, now, behind);
+        let saves = self.way_s(before, &new, after) + SAVED_MIN_S < self.way_s(before, now, after);
         if saves {
             now.copy_from_slice(&new);
         }

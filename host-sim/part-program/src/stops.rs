@@ -93,8 +93,8 @@ pub fn stops<F: Sync>(
     });
     let between: Vec<Option<[i32; 3]>> = between.collect::<Result<_, _>>()?;
     let before = std::iter::once(&None).chain(&between);
-    let behind = between.iter().chain([&None]);
-    let each = visits.iter().zip(before.zip(behind));
+    let after = between.iter().chain([&None]);
+    let each = visits.iter().zip(before.zip(after));
     Ok(each
         .map(|(visit, (home_nm, end))| Stop {
             home_nm: *home_nm,

@@ -297,7 +297,7 @@ fn escape_lines(text: &str) -> String {
     text.lines().map(escape).collect::<Vec<_>>().join("\n")
 }
 
-/// Data and scripts, behind the elements that they use.
+/// Data and scripts, after the elements that they use.
 fn scripts(out: &mut String, content: &Content<'_>) {
     // `<` is escaped, so that no text can end the script element.
     let data = payload(content).to_string().replace('<', "\\u003c");

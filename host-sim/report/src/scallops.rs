@@ -135,7 +135,7 @@ impl Scallops {
             .chain(across)
             .filter(|apart| apart.is_finite())
             .fold(0.0, f64::max);
-        // Half a step-over before the first and behind the last ridge, plus one cell each way for rounding.
+        // Half a step-over before the first and after the last ridge, plus one cell each way for rounding.
         widest.ceil() as usize + 2
     }
 }

@@ -1,4 +1,4 @@
-//! Where `run --resume` goes on: behind what the board's journal reports as complete.
+//! Where `run --resume` goes on: after what the board's journal reports as complete.
 
 use interp_core::RunStart;
 use machine::prepare::Prepared;

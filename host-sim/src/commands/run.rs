@@ -82,7 +82,7 @@ pub(super) struct Arguments {
     work: Option<u8>,
     #[command(flatten)]
     placed: home::Placed,
-    /// Goes on with the run of this job that a power cut, a fault or an abort has ended, behind what the board has journalled as complete. The axes have to be homed.
+    /// Goes on with the run of this job that a power cut, a fault or an abort has ended, after what the board has journalled as complete. The axes have to be homed.
     #[arg(long, requires = "port")]
     resume: bool,
     /// Stores the job on the board by this name, and does not run it: `operate start NAME` or the start button does. A job without `home_mm` then begins where the axes stand.

@@ -139,7 +139,7 @@ mod tests {
             let text = with_optional_keys(kind);
             let mut count = 0;
             for section in ["surface", "placement", "tool", "stock", "cut", "machine"] {
-                // A CAD file's face is resolved before the sections behind it are read; they are the same for every kind.
+                // A CAD file's face is resolved before the sections after it are read; they are the same for every kind.
                 if kind == Kind::File && section != "surface" {
                     continue;
                 }

@@ -1,6 +1,6 @@
 //! Rest to rest along one coordinate in closed form, for links: constant jerk, constant acceleration, constant jerk, cruise, and back.
 
-use super::pace::{Course, Use};
+use super::pace::{Trajectory, Use};
 use super::profile::{SlotAt, Span, fastest_around};
 use super::{MM_PER_Q10, to_q10};
 use crate::math::arith::sqrt;
@@ -360,7 +360,7 @@ impl CurveCursor {
     };
 }
 
-impl Course for Curve {
+impl Trajectory for Curve {
     type Cursor = CurveCursor;
 
     const IS_KNOWN_BETWEEN: bool = true;
@@ -462,10 +462,10 @@ impl Course for Curve {
 }
 
 impl Curve {
-    /// Least and greatest acceleration from one time before to another behind a place with this speed.
-    fn accelerations_beside(&self, cursor: &CurveCursor, [before, behind]: [f32; 2], speed: f32) -> [f32; 2] {
+    /// Least and greatest acceleration from one time before to another after a place with this speed.
+    fn accelerations_beside(&self, cursor: &CurveCursor, [before, after]: [f32; 2], speed: f32) -> [f32; 2] {
         let piece = self.piece(cursor.piece);
-        let mut range = piece.accelerations(cursor.time - before, cursor.time + behind);
+        let mut range = piece.accelerations(cursor.time - before, cursor.time + after);
         let mut add = |[least, greatest]: [f32; 2]| {
             range = [range[0].at_most(least), range[1].at_least(greatest)];
         };
@@ -478,7 +478,7 @@ impl Curve {
             let piece = self.piece(index);
             add(piece.accelerations(piece.ramp_s - earlier, piece.ramp_s));
         }
-        let later = cursor.time + behind - piece.ramp_s;
+        let later = cursor.time + after - piece.ramp_s;
         if later > 0.0
             && !self.is_last(cursor.piece)
             && to_f32(cursor.left_q10) * MM_PER_Q10 <= speed.at_least(piece.to) * later
@@ -488,7 +488,7 @@ impl Curve {
         range
     }
 
-    /// Least and greatest jerk this time before, at, and behind a place with this speed and jerk.
+    /// Least and greatest jerk this time before, at, and after a place with this speed and jerk.
     fn jerks_beside(&self, cursor: &CurveCursor, around: f32, [speed, here]: [f32; 2]) -> [f32; 2] {
         let piece = self.piece(cursor.piece);
         let jerk = |piece: &Piece, time: f32| {
@@ -505,14 +505,14 @@ impl Curve {
         };
         let ends =
             cursor.time + around >= piece.ramp_s && to_f32(cursor.left_q10) * MM_PER_Q10 <= speed * around;
-        let behind = if ends && !self.is_last(cursor.piece) {
+        let after = if ends && !self.is_last(cursor.piece) {
             jerk(self.piece(cursor.piece + 1), 0.0)
         } else {
             jerk(piece, cursor.time + around)
         };
         [
-            here.at_most(before).at_most(behind),
-            here.at_least(before).at_least(behind),
+            here.at_most(before).at_most(after),
+            here.at_least(before).at_least(after),
         ]
     }
 

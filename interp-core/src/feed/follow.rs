@@ -2,7 +2,7 @@
 //! that feed; the change to it and back is smooth.
 
 use super::limits::FeedChange;
-use super::pace::Course;
+use super::pace::Trajectory;
 use super::plan::{Cursor, Lead, Plan, to_mm};
 use crate::math::number::Bounded;
 

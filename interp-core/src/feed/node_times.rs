@@ -19,7 +19,7 @@ pub(super) struct NodeTimes {
     pub(super) at: f32,
     pub(super) busy: u16,
     pub(super) busy_count: u16,
-    /// Times of the busy places before and behind, and of the rests, s; the place from which the next rest is sought.
+    /// Times of the busy places before and after, and of the rests, s; the place from which the next rest is sought.
     pub(super) last: f32,
     pub(super) following: f32,
     pub(super) rests: [f32; 2],
@@ -28,7 +28,7 @@ pub(super) struct NodeTimes {
 }
 
 impl NodeTimes {
-    /// The time of the next node, s; none behind the last. Inlined, so that the fields are in registers while nodes are counted.
+    /// The time of the next node, s; none after the last. Inlined, so that the fields are in registers while nodes are counted.
     #[inline(always)]
     pub(super) fn next(&mut self, lists: &Lists) -> Option<f32> {
         if self.count == 0 {
@@ -59,16 +59,16 @@ impl NodeTimes {
             self.rests = [rest, time.at_most(self.duration)];
         }
         let before = (at - self.last.abs()).abs();
-        let behind = (self.following.abs() - at).abs();
-        let away = (before.at_most(behind) - self.mean_s).at_least(0.0);
+        let after = (self.following.abs() - at).abs();
+        let away = (before.at_most(after) - self.mean_s).at_least(0.0);
         let there = (self.spacing + self.growth * away).at_most(self.widest);
-        let [rest_before, rest_behind] = self.rests;
-        let from_end = (at - rest_before).at_most((rest_behind - at).abs()) - self.mean_s;
+        let [rest_before, rest_after] = self.rests;
+        let from_end = (at - rest_before).at_most((rest_after - at).abs()) - self.mean_s;
         there.at_most(self.end_spacing + self.end_growth * from_end.at_least(0.0))
     }
 }
 
-/// Time of the first rest among the busy places from this one on, and the place behind it.
+/// Time of the first rest among the busy places from this one on, and the place after it.
 #[cold]
 #[inline(never)]
 fn rest_from(lists: &Lists, from: u16, count: u16) -> (u16, f32) {

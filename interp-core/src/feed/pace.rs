@@ -34,13 +34,13 @@ const WHOLE_CHANGE: f32 = 2.0;
 
 /// Least duration of a profile's slot, s.
 const SLOT_MIN: f32 = 2e-3;
-/// Duration of a slot where the course is uneven, and after two attempts that failed, s.
+/// Duration of a slot where the trajectory is uneven, and after two attempts that failed, s.
 const SLOT_FINE: f32 = 1e-3;
 /// Factor on the duration of a slot after a search that did not end in time.
 const SLOT_COARSER: f32 = 2.0;
 /// Slots of the shortest change, from which the duration of a slot follows.
 const SLOTS_ENOUGH: f32 = 80.0;
-/// Longest slot as a share of [`Course::ramp_s`]: within a longer one the acceleration would change its sign.
+/// Longest slot as a share of [`Trajectory::ramp_s`]: within a longer one the acceleration would change its sign.
 const SLOT_OF_RAMP: f32 = 0.5;
 /// Most slots of the shortest change.
 const SLOTS_MOST: f32 = 250.0;
@@ -63,7 +63,7 @@ const LONG_STOP_S: f32 = 0.35;
 /// Most searches for a shorter one.
 const LONG_STOP_SEARCHES: u8 = 2;
 
-/// Longest stop that the first searches try, as a multiple of the shortest: one that begins behind a place that leaves little ends earlier.
+/// Longest stop that the first searches try, as a multiple of the shortest: one that begins after a place that leaves little ends earlier.
 const SHORT: f32 = 1.6;
 /// Number of these searches.
 const SHORT_SEARCHES: u8 = 5;
@@ -75,7 +75,7 @@ const STUCK: u8 = 2;
 const SAME: f32 = 1e-6;
 
 /// A planned motion from rest to rest.
-pub(crate) trait Course {
+pub(crate) trait Trajectory {
     /// A place on it.
     type Cursor: Copy;
 
@@ -88,7 +88,7 @@ pub(crate) trait Course {
     /// Whether the motion is over.
     fn is_over(&self, cursor: &Self::Cursor) -> bool;
 
-    /// Use of the limits at a place and a pace with its first two derivatives, 1, 1/s, 1/s^2. `around`: time before and behind that the place
+    /// Use of the limits at a place and a pace with its first two derivatives, 1, 1/s, 1/s^2. `around`: time before and after that the place
     /// stands for, s.
     fn use_at(&self, cursor: &Self::Cursor, rates: [f32; 3], around: f32) -> Use;
 
@@ -305,7 +305,7 @@ impl<C: Copy> Pace<C> {
             if search.left > 0 {
                 search.left -= 1;
             } else if search.found {
-                self.take(profiles);
+                self.follow_found(profiles);
             } else if self.is_changing() || self.goal != 0.0 {
                 self.timeouts = self.timeouts.saturating_add(1);
                 self.search = None;
@@ -356,7 +356,7 @@ impl<C: Copy> Pace<C> {
     }
 
     /// Follows the change that was found.
-    fn take(&mut self, profiles: &mut Profiles) {
+    fn follow_found(&mut self, profiles: &mut Profiles) {
         let Some(search) = &self.search else {
             return;
         };
@@ -377,12 +377,17 @@ impl<C: Copy> Pace<C> {
     }
 
     /// One place of the search. `at`: where the motion is.
-    pub(crate) fn work<P: Course<Cursor = C>>(&mut self, course: &P, at: &C, profiles: &mut Profiles) {
+    pub(crate) fn work<P: Trajectory<Cursor = C>>(
+        &mut self,
+        trajectory: &P,
+        at: &C,
+        profiles: &mut Profiles,
+    ) {
         if !self.has_work() {
             return;
         }
         let Some(search) = &mut self.search else {
-            self.search = self.begin_search(course, at, profiles);
+            self.search = self.begin_search(trajectory, at, profiles);
             if self.search.is_none() {
                 self.wait = ABOVE_WAIT;
             }
@@ -395,7 +400,7 @@ impl<C: Copy> Pace<C> {
                 .at_least(search.above.map_or(1.0, |above| above.top())),
             period: self.period,
         };
-        if !search.work(course, &bounds, profiles) {
+        if !search.work(trajectory, &bounds, profiles) {
             if search.above.is_some() {
                 self.wait = ABOVE_WAIT;
             } else {
@@ -406,29 +411,29 @@ impl<C: Copy> Pace<C> {
     }
 
     /// The search for what is wanted; none where no pace above 1 is worth it.
-    fn begin_search<P: Course<Cursor = C>>(
+    fn begin_search<P: Trajectory<Cursor = C>>(
         &self,
-        course: &P,
+        trajectory: &P,
         at: &C,
         profiles: &mut Profiles,
     ) -> Option<Search<C>> {
-        let is_uneven = course.is_uneven(at);
+        let is_uneven = trajectory.is_uneven(at);
         let widest = if is_uneven { SPACING } else { SPACING_WIDE };
         // At rest a resume comes first.
         if self.may_seek_above() && self.wanted == 1.0 && (self.goal > 0.0 || self.is_changing()) {
-            let above = self.begin_above(course, at, profiles, widest);
+            let above = self.begin_above(trajectory, at, profiles, widest);
             if above.is_some() || !self.is_seeking() {
                 return above;
             }
         }
         let [pace, ..] = self.rates();
-        let shortest = Inertia::at(course, at).shortest(self.wanted - pace, self.period);
+        let shortest = Inertia::at(trajectory, at).shortest(self.wanted - pace, self.period);
         let makes_profile = self.makes_profile();
         let finest = self.slot_of(SLOT_FINE);
         let slot_s = if is_uneven {
             finest
         } else {
-            self.slot::<P>(shortest, course.ramp_s())
+            self.slot::<P>(shortest, trajectory.ramp_s())
         };
         let (least, places) = if makes_profile {
             let share = if is_uneven { PLACES_FINE } else { PROFILE_PLACES };
@@ -437,10 +442,10 @@ impl<C: Copy> Pace<C> {
             (LATENCY, QUINTIC_PLACES * shortest / spacing(shortest, widest))
         };
         let latency = self.latency(least, places);
-        let (from, rates) = self.ahead(course, at, profiles, latency);
+        let (from, rates) = self.ahead(trajectory, at, profiles, latency);
         let [pace, ..] = rates;
         let goal = self.goal_from(pace);
-        let shortest = Inertia::at(course, &from).shortest(goal - pace, self.period);
+        let shortest = Inertia::at(trajectory, &from).shortest(goal - pace, self.period);
         let change = Change::new(rates, goal, shortest);
         let mut search = Search::new((from, rates), goal, latency, widest, change);
         if self.wanted == 0.0 && self.failures < SHORT_SEARCHES {
@@ -448,7 +453,7 @@ impl<C: Copy> Pace<C> {
         }
         if makes_profile {
             let finest = if P::IS_KNOWN_BETWEEN { slot_s } else { finest };
-            search.make_profile(course, profiles, [slot_s, finest]);
+            search.make_profile(trajectory, profiles, [slot_s, finest]);
         }
         Some(search)
     }
@@ -463,20 +468,20 @@ impl<C: Copy> Pace<C> {
     }
 
     /// The search for a pace above 1; none where the velocity limits leave none.
-    fn begin_above<P: Course<Cursor = C>>(
+    fn begin_above<P: Trajectory<Cursor = C>>(
         &self,
-        course: &P,
+        trajectory: &P,
         at: &C,
         profiles: &Profiles,
         widest: f32,
     ) -> Option<Search<C>> {
         let above = |place: &C, rates: [f32; 3], ahead: f32| {
-            let used = course.use_at(place, [1.0, 0.0, 0.0], 0.0);
+            let used = trajectory.use_at(place, [1.0, 0.0, 0.0], 0.0);
             let top = self
                 .above
                 .at_most(self.most)
                 .at_most(ABOVE_VELOCITY / used.velocity.at_least(1e-6));
-            let inertia = Inertia::at(course, place);
+            let inertia = Inertia::at(trajectory, place);
             (top >= ABOVE_MIN).then(|| match self.above_until(ahead) {
                 Some([kept, until_s]) if until_s > 0.0 && kept <= top => {
                     let top = if top - kept < ABOVE_SAME { kept } else { top };
@@ -495,7 +500,7 @@ impl<C: Copy> Pace<C> {
         };
         let first = above(at, self.rates(), 0.0)?;
         let latency = self.latency(LATENCY_ABOVE, ABOVE_PLACES * first.duration() / widest);
-        let (from, rates) = self.ahead(course, at, profiles, latency);
+        let (from, rates) = self.ahead(trajectory, at, profiles, latency);
         let above = above(&from, rates, self.period * f32::from(latency))?;
         let mut search = Search::new((from, rates), 1.0, latency, widest, above.change(rates));
         search.above = Some(above);
@@ -518,9 +523,9 @@ impl<C: Copy> Pace<C> {
 
     /// Where the motion will be after some periods, and its pace there.
     #[inline(never)]
-    fn ahead<P: Course<Cursor = C>>(
+    fn ahead<P: Trajectory<Cursor = C>>(
         &self,
-        course: &P,
+        trajectory: &P,
         at: &C,
         profiles: &Profiles,
         periods: u16,
@@ -541,7 +546,7 @@ impl<C: Copy> Pace<C> {
                 let [pace, _, _] = self.rates_of_change(ahead + 0.5 * step);
                 pace
             };
-            course.advance(&mut from, step * pace.at_least(0.0));
+            trajectory.advance(&mut from, step * pace.at_least(0.0));
             ahead += step;
         }
         let rates = if self.on_profile {
@@ -558,7 +563,7 @@ impl<C: Copy> Pace<C> {
     }
 
     /// Duration of a slot, s: whole periods.
-    fn slot<P: Course<Cursor = C>>(&self, shortest: f32, ramp_s: f32) -> f32 {
+    fn slot<P: Trajectory<Cursor = C>>(&self, shortest: f32, ramp_s: f32) -> f32 {
         let wanted = (shortest * (1.0 / SLOTS_ENOUGH)).at_least(SLOT_MIN);
         let is_late = P::IS_KNOWN_BETWEEN && self.timeouts > 0;
         let coarser = if is_late { SLOT_COARSER } else { 1.0 };

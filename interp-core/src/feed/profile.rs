@@ -145,7 +145,7 @@ pub(crate) struct SlotAt {
     /// r in its middle, and r' at its start, 1/s.
     pub(crate) r: f32,
     pub(crate) first: f32,
-    /// Its duration, and the time before and behind its middle that the place stands for, s.
+    /// Its duration, and the time before and after its middle that the place stands for, s.
     pub(crate) slot_s: f32,
     pub(crate) around: f32,
 }
@@ -179,7 +179,7 @@ pub(crate) struct Profile {
     /// r and r' at the start.
     start: [f32; 2],
     goal: f32,
-    /// Duration of the parabola behind the last segment, s.
+    /// Duration of the parabola after the last segment, s.
     end_s: f32,
 }
 

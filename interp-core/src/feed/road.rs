@@ -1,7 +1,7 @@
-//! The plan that is followed and, through the turn behind it, the next: where a change of the pace may lead. And the last place of a plan from which
+//! The plan that is followed and, through the turn after it, the next: where a change of the pace may lead. And the last place of a plan from which
 //! the tool still stops before the next begins.
 
-use super::pace::{Change, Course, Use, room_of};
+use super::pace::{Change, Trajectory, Use, room_of};
 use super::plan::{Cursor, Gate, Plan};
 use super::profile::{SlotAt, Span};
 use crate::math::arith::inverse_sqrt;
@@ -48,7 +48,7 @@ impl Road<'_> {
     }
 }
 
-impl Course for Road<'_> {
+impl Trajectory for Road<'_> {
     type Cursor = Cursor;
 
     fn advance(&self, cursor: &mut Cursor, seconds: f32) {

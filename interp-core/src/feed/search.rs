@@ -1,7 +1,7 @@
 //! The search for a change of the pace: trials, each followed over its whole length, from the state that the motion will have when the search is over.
 
 use super::change::Change;
-use super::pace::Course;
+use super::pace::Trajectory;
 use super::profile::{Making, Profiles, Slot};
 use super::room::{SPACING, Use, room_of_change};
 use crate::math::arith::sqrt;
@@ -58,9 +58,9 @@ pub(super) struct Inertia {
 }
 
 impl Inertia {
-    pub(super) fn at<P: Course>(course: &P, at: &P::Cursor) -> Self {
+    pub(super) fn at<P: Trajectory>(trajectory: &P, at: &P::Cursor) -> Self {
         let [first, second] =
-            [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|[_, r1, r2]| course.use_at(at, [1e-9, r1, r2], 0.0));
+            [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|[_, r1, r2]| trajectory.use_at(at, [1e-9, r1, r2], 0.0));
         Self {
             by_first: first.acceleration,
             by_second: second.jerk,
@@ -238,44 +238,44 @@ impl<C: Copy> Search<C> {
     }
 
     /// Makes a profile of slots of this duration, or as short as the finest, s, before quintics are tried.
-    pub(super) fn make_profile<P: Course<Cursor = C>>(
+    pub(super) fn make_profile<P: Trajectory<Cursor = C>>(
         &mut self,
-        course: &P,
+        trajectory: &P,
         profiles: &mut Profiles,
         [slot_s, finest]: [f32; 2],
     ) {
         let [pace, first, _] = self.rates;
         profiles.made().clear([pace, first], self.goal, slot_s);
         let making = Making::new([pace, first], finest);
-        self.place_first_slot(course, &making, slot_s);
+        self.place_first_slot(trajectory, &making, slot_s);
         self.making = Some(making);
         self.is_profile = true;
     }
 
-    fn place_first_slot<P: Course<Cursor = C>>(&mut self, course: &P, making: &Making, slot_s: f32) {
+    fn place_first_slot<P: Trajectory<Cursor = C>>(&mut self, trajectory: &P, making: &Making, slot_s: f32) {
         let [pace, first] = making.rates();
         self.at = self.from;
         let way = 0.5 * slot_s * (pace + 0.25 * slot_s * first);
-        course.advance(&mut self.at, way.at_least(0.0));
+        trajectory.advance(&mut self.at, way.at_least(0.0));
     }
 
     /// One place; whether there is hope.
-    pub(super) fn work<P: Course<Cursor = C>>(
+    pub(super) fn work<P: Trajectory<Cursor = C>>(
         &mut self,
-        course: &P,
+        trajectory: &P,
         bounds: &Bounds,
         profiles: &mut Profiles,
     ) -> bool {
         if self.is_profile {
-            self.work_on_profile(course, bounds, profiles);
+            self.work_on_profile(trajectory, bounds, profiles);
             return true;
         }
-        self.work_on_change(course, bounds)
+        self.work_on_change(trajectory, bounds)
     }
 
-    fn work_on_profile<P: Course<Cursor = C>>(
+    fn work_on_profile<P: Trajectory<Cursor = C>>(
         &mut self,
-        course: &P,
+        trajectory: &P,
         bounds: &Bounds,
         profiles: &mut Profiles,
     ) {
@@ -290,26 +290,26 @@ impl<C: Copy> Search<C> {
             jerk: PROFILE_JERK * room.jerk,
             ..room
         };
-        let span = course.span_at(&self.at, &slot_at, &room);
+        let span = trajectory.span_at(&self.at, &slot_at, &room);
         let slot = making.append(profile, &span, PACE_MAX * bounds.ceiling);
         let step = profile.slot_s();
         match slot {
-            Slot::Appended if course.is_over(&self.at) => {
+            Slot::Appended if trajectory.is_over(&self.at) => {
                 making.end(profile);
                 self.found = true;
             }
             Slot::Appended => {
                 let [pace, _] = making.rates();
-                course.advance(&mut self.at, step * pace.at_least(0.0));
+                trajectory.advance(&mut self.at, step * pace.at_least(0.0));
             }
             Slot::Complete => self.found = true,
-            Slot::Again => self.place_first_slot(course, &making, step),
+            Slot::Again => self.place_first_slot(trajectory, &making, step),
             Slot::Failed => (self.at, self.is_profile) = (self.from, false),
         }
         self.making = Some(making);
     }
 
-    fn work_on_change<P: Course<Cursor = C>>(&mut self, course: &P, bounds: &Bounds) -> bool {
+    fn work_on_change<P: Trajectory<Cursor = C>>(&mut self, trajectory: &P, bounds: &Bounds) -> bool {
         let duration = self.change.duration();
         let step = match self.above {
             Some(_) => self.widest.at_least(bounds.period),
@@ -319,7 +319,7 @@ impl<C: Copy> Search<C> {
         let rates = self.change.rates(time);
         let [pace, first, _] = rates;
         let room = room_of_change(bounds.is_fault, pace, self.widest);
-        let mut ratio = course.use_at(&self.at, rates, 0.5 * step).ratio(&room);
+        let mut ratio = trajectory.use_at(&self.at, rates, 0.5 * step).ratio(&room);
         ratio = ratio.at_least(first.abs() * bounds.period * (1.0 / CHANGE_MAX));
         let most = PACE_MAX * bounds.ceiling;
         if !(PACE_MIN..=most).contains(&pace) {
@@ -329,12 +329,12 @@ impl<C: Copy> Search<C> {
             return self.try_next(bounds, time, ratio);
         }
         self.points += 1;
-        if time >= duration || course.is_over(&self.at) {
+        if time >= duration || trajectory.is_over(&self.at) {
             self.found = true;
             return true;
         }
         let [middle, _, _] = self.change.rates((time + 0.5 * step).at_most(duration));
-        course.advance(&mut self.at, step * middle.at_least(0.0));
+        trajectory.advance(&mut self.at, step * middle.at_least(0.0));
         true
     }
 

@@ -113,7 +113,7 @@ impl Stations {
         }
     }
 
-    /// Removes the stations behind this number of them.
+    /// Removes the stations after this number of them.
     pub(crate) const fn truncate(&mut self, count: u16) {
         if count < self.count {
             self.count = count;
@@ -194,7 +194,7 @@ impl Stations {
         low
     }
 
-    /// Distance from a station to an arc behind it, mm.
+    /// Distance from a station to an arc after it, mm.
     pub(crate) fn since(&self, station: u16, arc_q10: i64) -> f32 {
         let from = i64::from(self.get(station).arc_nm) << Q10_BITS;
         crate::math::number::to_f32(arc_q10 - from) * MM_PER_Q10

@@ -241,7 +241,7 @@ impl Motion {
             sequencer.plan(program, store, run);
             return;
         }
-        // A piece of a front is read from the words behind the job's.
+        // A piece of a front is read from the words after the job's.
         let spent = program.job(store).map_or(0, |job| run.prepare_piece(&job));
         if let Ok((job, rest)) = program.job_and_rest(store) {
             run.plan(&job, rest, spent);

@@ -223,9 +223,9 @@ pub struct Header {
     pub scallop_mm: f32,
     /// Sampling period T, s, 1e-5 to 0.1.
     pub period_s: f32,
-    /// Records of the region that is machined, in the words behind the patches: [`region`]; 0 for the whole surface. With passes of constant scallop height each cell gives its direction, and the spacing is [`Spacing::Constant`].
+    /// Records of the region that is machined, in the words after the patches: [`region`]; 0 for the whole surface. With passes of constant scallop height each cell gives its direction, and the spacing is [`Spacing::Constant`].
     pub edges: u16,
-    /// Words of links: passes behind them are reached at the safe height. Only with axis limits, and straight passes or a region.
+    /// Words of links: passes after them are reached at the safe height. Only with axis limits, and straight passes or a region.
     pub links: u16,
     /// Rows of patches that a pass and what is planned on it may use, for a job that is loaded while it runs: [`stream`]. 0 for one that is stored as a whole.
     pub window: u16,

@@ -69,7 +69,7 @@ pub fn region_checks(header: &Header) -> u32 {
     u32::from(header.edges).div_ceil(EDGES_A_RECORD)
 }
 
-/// Words of the store that a job takes behind its data, for the stations of passes of constant scallop height; none where it crosses more patches than there
+/// Words of the store that a job takes after its data, for the stations of passes of constant scallop height; none where it crosses more patches than there
 /// may be stations for.
 #[must_use]
 pub fn front_words(header: &Header) -> Option<usize> {
@@ -386,7 +386,7 @@ impl Program {
         &self.header
     }
 
-    /// The sealed job, and the words behind it.
+    /// The sealed job, and the words after it.
     ///
     /// # Errors
     /// As [`Self::job`].
@@ -422,7 +422,7 @@ pub(crate) struct Job<'a> {
 }
 
 impl<'a> Job<'a> {
-    /// The words behind the job's.
+    /// The words after the job's.
     pub(crate) fn rest(&self) -> &'a [i32] {
         self.store.get(self.length..).unwrap_or(&[])
     }
@@ -436,7 +436,7 @@ impl<'a> Job<'a> {
         Some(RegionWords::new(words.get(..region_words(self.header))?))
     }
 
-    /// The first word of the region: before the rows of a streamed job, behind those of one that is stored as a whole.
+    /// The first word of the region: before the rows of a streamed job, after those of one that is stored as a whole.
     fn tail(&self) -> usize {
         let (patches, _) = extent(self.header);
         let widths = width_words(self.header.path_spans, self.header.side_spans) as usize;

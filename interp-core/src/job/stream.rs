@@ -30,7 +30,7 @@ use crate::job::program::{bad_patch, record_words, tail_words};
 use crate::job::{Header, width_words};
 use crate::surface::{POLYNOMIAL_WORDS, PolynomialRecord, RATIONAL_WORDS, RationalRecord, split_patch};
 
-/// Words of the digest behind a row.
+/// Words of the digest after a row.
 pub const DIGEST_WORDS: usize = 2;
 /// Least window: the row of the tool, the one of the next pass, the one that is looked at from there.
 pub const WINDOW_MIN: u16 = 3;
@@ -123,7 +123,7 @@ impl StripInJob {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RowsNeeded {
     /// The first row that the passes before the planned one still need; none where these are over.
-    pub behind: Option<u16>,
+    pub after: Option<u16>,
     /// The row of the pass before the planned one.
     pub before: u16,
     /// The row of the planned pass.
@@ -271,7 +271,7 @@ impl Rows {
         self.head.saturating_add(rows.saturating_mul(self.row_words))
     }
 
-    /// Stores words behind those received.
+    /// Stores words after those received.
     ///
     /// # Errors
     /// The words received, where these are not the next ones, or the words up to which there is room or a job.
@@ -295,9 +295,9 @@ impl Rows {
         for word in words {
             let place = match self.received.checked_sub(self.head) {
                 None => Some(self.received as usize),
-                Some(behind) => {
-                    let row = behind.checked_div(self.row_words).unwrap_or(0);
-                    let within = behind.checked_rem(self.row_words).unwrap_or(0);
+                Some(after) => {
+                    let row = after.checked_div(self.row_words).unwrap_or(0);
+                    let within = after.checked_rem(self.row_words).unwrap_or(0);
                     self.oldest = self.oldest.max((row + 1).saturating_sub(self.slots));
                     self.start_of(row).map(|start| start + within as usize)
                 }
@@ -351,7 +351,7 @@ impl Rows {
         self.asked = None;
     }
 
-    /// The strip of the next pass, in this row, behind one in that row.
+    /// The strip of the next pass, in this row, after one in that row.
     fn strip_of(&self, store: &[i32], row: u16, before: u16) -> Option<StripInJob> {
         let [_, now] = &self.current;
         if row >= before && now.strip.index(row).is_some() {
@@ -381,7 +381,7 @@ impl Rows {
         let last = strip
             .place(needed.last.min(strip.strip.last()))
             .ok_or_else(absent)?;
-        let first = match needed.behind {
+        let first = match needed.after {
             Some(row) => now.place(row),
             None => strip.place(needed.own),
         };

@@ -1,6 +1,7 @@
 //! Three-component vectors with scalar and vector product.
 
 use crate::math::arith::to_f32;
+use crate::math::number::{MM_PER_NM, to_f32 as wide_to_f32};
 use core::ops::{Add, Mul, Sub};
 
 /// A vector in a patch's units, or a derivative.
@@ -27,6 +28,15 @@ impl Vec3 {
     #[must_use]
     pub(crate) fn of([x, y, z]: [i32; 3]) -> Self {
         Self::new(to_f32(x), to_f32(y), to_f32(z))
+    }
+
+    /// From one place to another, both in units of 2^-30 nm, mm.
+    #[inline(always)]
+    #[must_use]
+    pub(crate) fn between_q30([x0, y0, z0]: &[i64; 3], [x, y, z]: &[i64; 3]) -> Self {
+        const MM_PER_Q30: f32 = MM_PER_NM / 1_073_741_824.0;
+        let mm = |from: &i64, to: &i64| wide_to_f32(to.wrapping_sub(*from)) * MM_PER_Q30;
+        Self::new(mm(x0, x), mm(y0, y), mm(z0, z))
     }
 
     /// Scalar product.

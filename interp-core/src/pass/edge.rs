@@ -6,7 +6,7 @@
 
 use crate::job::program::Job;
 use crate::math::arith::{fraction_from_f32, sqrt};
-use crate::math::number::{Bounded, MM_PER_NM, to_f32};
+use crate::math::number::Bounded;
 use crate::math::vec3::Vec3;
 use crate::pass::patch::Patch;
 use crate::pass::position::PassPosition;
@@ -316,11 +316,7 @@ impl EdgeSearch {
 
     /// The point, seen from a contact of a ball.
     fn see(&self, patch: &Patch, contact: &Contact) -> Seen {
-        const MM_PER_Q30: f32 = MM_PER_NM / 1_073_741_824.0;
-        let [x, y, z] = patch.locator.contact_q30(contact, &patch.origin);
-        let [x0, y0, z0] = self.point;
-        let apart = |to: i64, from: i64| to_f32(to.wrapping_sub(from)) * MM_PER_Q30;
-        let chord = Vec3::new(apart(x, x0), apart(y, y0), apart(z, z0));
+        let chord = Vec3::between_q30(&self.point, &patch.locator.contact_q30(contact, &patch.origin));
         let offset = patch.locator.offset_mm(contact);
         let radius = sqrt(self.normal_mm.dot(self.normal_mm));
         Seen {

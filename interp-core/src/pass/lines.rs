@@ -111,7 +111,7 @@ impl RegionLines {
     }
 
     /// The next pass on this line.
-    pub(crate) fn take(&mut self, header: &Header) -> Option<Route> {
+    pub(crate) fn next_route(&mut self, header: &Header) -> Option<Route> {
         if !self.has_more() {
             return None;
         }
@@ -202,7 +202,7 @@ impl RegionLines {
         }
     }
 
-    /// Whether a cell is behind this one.
+    /// Whether a cell is after this one.
     pub(crate) fn has_next_cell(&self, job: &Job<'_>) -> bool {
         let next = self.cell(job).map(|cell| cell.next());
         next.is_some_and(|next| job.region().is_some_and(|region| region.cell(next).is_some()))

@@ -176,7 +176,7 @@ impl Patch {
             self.surface = Surface::Curve(CurvePass::NONE);
         }
         if let Surface::Curve(pass) = &mut self.surface {
-            pass.take(kind, words, radius);
+            pass.load_record(kind, words, radius);
         }
         self.point = false;
         self.forget_ends();

@@ -77,7 +77,7 @@ impl RowHistory {
         self.asked = Some(needed.own);
     }
 
-    /// Whether the next pass, in this row, lies outside the window, and its rows were not asked for: behind a turn.
+    /// Whether the next pass, in this row, lies outside the window, and its rows were not asked for: after a turn.
     pub(crate) fn lacks(&self, header: &Header, row: u16) -> bool {
         let [own, ..] = self.rows;
         let is_first = own == u16::MAX;
@@ -198,14 +198,14 @@ impl RowHistory {
         width: impl Fn(u16) -> f32,
     ) -> RowsNeeded {
         let [own, before, _] = self.rows;
-        let behind = match FirstRow::of(header) {
+        let after = match FirstRow::of(header) {
             FirstRow::Own => None,
             FirstRow::Before => Some(own),
             FirstRow::Left | FirstRow::Turned => Some(before),
         };
         let step = step.filter(|_| FirstRow::of(header) != FirstRow::Turned);
         let is_near = !self.jumps(header, side.span);
-        let first = behind.filter(|_| is_near).unwrap_or(side.span);
+        let first = after.filter(|_| is_near).unwrap_or(side.span);
         let spans = Self::from(first, header);
         let step = step.unwrap_or(f32::INFINITY).at_least(0.0);
         let last = if step == f32::INFINITY {
@@ -215,7 +215,7 @@ impl RowHistory {
             schedule::next_side(side, step, spans, width).map_or(side.span, |line| line.span.max(side.span))
         };
         RowsNeeded {
-            behind,
+            after,
             before: own,
             own: side.span,
             last,
@@ -266,7 +266,7 @@ mod tests {
                         next
                     };
                     let needed = rows.needed(&header, side, None, |_| 1.0);
-                    let from = needed.behind.unwrap_or(needed.own);
+                    let from = needed.after.unwrap_or(needed.own);
                     let first = if rows.jumps(&header, side.span) {
                         needed.own
                     } else {

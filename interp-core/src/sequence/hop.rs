@@ -2,7 +2,7 @@
 //! the ball is at the safe height or above; up and down move z only, so each axis keeps its limits whatever the others do.
 
 use crate::feed::curve::{Curve, CurveCursor};
-use crate::feed::pace::{Course, Pace, Use};
+use crate::feed::pace::{Pace, Trajectory, Use};
 use crate::feed::profile::{Profiles, SlotAt, Span};
 use crate::job::AxisLimits;
 use crate::math::arith::{sqrt, truncated};
@@ -31,7 +31,7 @@ struct Curves {
     begins: [f32; 3],
 }
 
-impl Course for Curves {
+impl Trajectory for Curves {
     type Cursor = HopCursor;
 
     const IS_KNOWN_BETWEEN: bool = true;

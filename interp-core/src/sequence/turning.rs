@@ -14,7 +14,7 @@ use crate::sample::Sample;
 /// Changes of the pace below this are ignored.
 const SAME: f32 = 1e-4;
 
-/// Where a plan's arc is: in the half turn before the pass or behind it at this arc of the turn, or on the pass; units of 2^-10 nm.
+/// Where a plan's arc is: in the half turn before the pass or after it at this arc of the turn, or on the pass; units of 2^-10 nm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Part {
     Turn(i64),

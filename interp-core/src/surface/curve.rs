@@ -76,7 +76,7 @@ impl CurvePass {
     };
 
     /// Becomes the patch with this record. `radius`: the ball's in units, signed by the tool side.
-    pub(crate) fn take(&mut self, kind: RecordKind, words: &[i32], radius: f32) {
+    pub(crate) fn load_record(&mut self, kind: RecordKind, words: &[i32], radius: f32) {
         self.radius = radius;
         match kind {
             RecordKind::Profile | RecordKind::Circle => {

@@ -1,7 +1,7 @@
 //! The campaign of random command sequences: `cargo run --release -p integration-tests --bin sequences -- FROM COUNT`. Each seed is a sequence of its own,
 //! so a campaign goes on with the seed after the last.
 
-use integration_tests::sequences::{Course, run_all};
+use integration_tests::sequences::{Trajectory, run_all};
 use std::process::ExitCode;
 
 /// Seeds between two lines of progress.
@@ -13,7 +13,7 @@ fn main() -> ExitCode {
         eprintln!("sequences FROM COUNT: runs the sequences of COUNT seeds, the first one FROM");
         return ExitCode::from(2);
     };
-    let courses = Course::all();
+    let courses = Trajectory::all();
     let mut failed = false;
     let mut first = from;
     while first < from + count {

@@ -78,7 +78,7 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "whole numbers beside the best real one",
     ),
     (
-        "interp_core::feed::curve::Curve as interp_core::feed::pace::Course::advance",
+        "interp_core::feed::curve::Curve as interp_core::feed::pace::Trajectory::advance",
         3,
         "pieces of a curve, and phases of a ramp",
     ),
@@ -108,7 +108,7 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "coefficients of a pace: COEFFICIENTS",
     ),
     (
-        "interp_core::feed::newton::take",
+        "interp_core::feed::newton::apply_step",
         162,
         "coefficients of a pace: COEFFICIENTS",
     ),
@@ -441,7 +441,7 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "arcs of a period: ARCS_MAX",
     ),
     (
-        "interp_core::surface::curve::CurvePass::take",
+        "interp_core::surface::curve::CurvePass::load_record",
         64,
         "words of a record",
     ),
@@ -494,12 +494,12 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "ends of the gap",
     ),
     (
-        "interp_core::sequence::hop::Curves as interp_core::feed::pace::Course::use_at",
+        "interp_core::sequence::hop::Curves as interp_core::feed::pace::Trajectory::use_at",
         3,
         "curves of a hop",
     ),
     (
-        "interp_core::sequence::hop::Curves as interp_core::feed::pace::Course::span_at",
+        "interp_core::sequence::hop::Curves as interp_core::feed::pace::Trajectory::span_at",
         3,
         "curves of a hop",
     ),

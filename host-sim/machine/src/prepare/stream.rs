@@ -129,7 +129,7 @@ pub(crate) fn spare_words(prepared: &Prepared) -> usize {
     STORE_WORDS.saturating_sub(head_words(&prepared.header) + rows)
 }
 
-/// Gives a streamed job these words of links, behind those of its region, instead of those that it has.
+/// Gives a streamed job these words of links, after those of its region, instead of those that it has.
 pub(crate) fn set_links(prepared: &mut Prepared, links: &[i32], count: u16) {
     let end = head_words(&prepared.header) - usize::from(prepared.header.strips);
     let first = end - usize::from(prepared.header.links);

@@ -392,7 +392,7 @@ mod tests {
             centres.extend(leg(centres[96], turn_deg));
             let (count, off) = stored(&centres);
             assert!(count < 45, "{count} samples at {turn_deg} degrees");
-            // Up to the first sample behind the corner that is off the line; half a step where the path goes straight back.
+            // Up to the first sample after the corner that is off the line; half a step where the path goes straight back.
             assert!(
                 off < if turn_deg < 180.0 { 4e-5 } else { 1e-3 },
                 "{off} mm at {turn_deg} degrees"

@@ -27,7 +27,7 @@ const DIAGONALS: [usize; 3] = [1, 2, 3];
 pub(crate) const SHAPE: usize = 4;
 const _: () = assert!(LIST >= COEFFICIENTS);
 
-/// Greatest factor of the pace that keeps the rows of a node and behind it.
+/// Greatest factor of the pace that keeps the rows of a node and after it.
 #[inline(never)]
 pub(crate) fn factor(plan: &Plan, limits: &MotionLimits, lists: &Lists, sweep: &mut Sweep) -> f32 {
     let (place, speed) = at_node(plan, limits, sweep);
@@ -46,7 +46,7 @@ pub(crate) fn factor(plan: &Plan, limits: &MotionLimits, lists: &Lists, sweep: &
     factor
 }
 
-/// The greatest use of an acceleration or a jerk at a node and behind it.
+/// The greatest use of an acceleration or a jerk at a node and after it.
 #[inline(never)]
 pub(crate) fn most_used(plan: &Plan, limits: &MotionLimits, lists: &Lists, sweep: &mut Sweep) -> f32 {
     let (place, _) = at_node(plan, limits, sweep);
@@ -63,7 +63,7 @@ fn share(lists: &Lists, weight: f32, index: u16) -> f32 {
     weight * inverse_sqrt(get(lists, SHAPE, index).at_least(1e-9))
 }
 
-/// Adds the rows of a node and behind it to gradient and Hessian. `weight`: one over the sum of `1/sqrt(shape)`.
+/// Adds the rows of a node and after it to gradient and Hessian. `weight`: one over the sum of `1/sqrt(shape)`.
 #[inline(never)]
 pub(crate) fn assemble(
     plan: &Plan,
@@ -107,7 +107,7 @@ pub(crate) fn assemble(
     });
 }
 
-/// Adds the rows of a node and behind it to the reach of the step.
+/// Adds the rows of a node and after it to the reach of the step.
 #[inline(never)]
 pub(crate) fn extend(
     plan: &Plan,
@@ -159,8 +159,8 @@ fn direction(gradient: &[f32; LIST], node: u16, intervals: u16) -> Local {
     }
 }
 
-/// Takes the step.
-pub(crate) fn take(plan: &Plan, lists: &mut Lists, step: f32) {
+/// Applies the step to the draft.
+pub(crate) fn apply_step(plan: &Plan, lists: &mut Lists, step: f32) {
     if !(step > 0.0) {
         return;
     }

@@ -11,7 +11,7 @@ pub(super) const SLACK_MIN: f32 = 1e-6;
 /// Share of the way to the next limit that a step goes.
 const STEP_SHARE: f32 = 0.97;
 
-/// c, c' of the pace, and c'' before and behind.
+/// c, c' of the pace, and c'' before and after.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Local {
     pub(super) c: f32,
@@ -21,7 +21,7 @@ pub(super) struct Local {
 
 /// A place of the plan: its motion at pace 1, and the path there.
 pub(super) struct Place {
-    /// mm/s, mm/s^2; jerk before and behind, mm/s^3; inverse time of an interval, 1/s.
+    /// mm/s, mm/s^2; jerk before and after, mm/s^3; inverse time of an interval, 1/s.
     pub(super) v: f32,
     pub(super) a: f32,
     pub(super) j: [f32; 2],
@@ -37,7 +37,7 @@ pub(super) struct Place {
 struct AxisRows {
     pub(super) x0: f32,
     pub(super) x1: f32,
-    /// Y0 before and behind.
+    /// Y0 before and after.
     pub(super) y0: [f32; 2],
     pub(super) y1: f32,
     pub(super) y2: f32,
@@ -51,7 +51,7 @@ impl Place {
     fn rows(&self, limits: &MotionLimits, mut each: impl FnMut(&AxisRows)) {
         let (v, a, h) = (self.v, self.a, self.h);
         let v2 = v * v;
-        let [before, behind] = self.j;
+        let [before, after] = self.j;
         for (([q1, q2, q3], inverse), [first, second]) in self.q.iter().zip(&limits.inverse).zip(&self.jump) {
             let t1 = 0.5 * h * q1 * v;
             let t2 = q2 * v2 + q1 * a;
@@ -61,7 +61,7 @@ impl Place {
                 x1: t1 * inverse.acceleration,
                 y0: [
                     (t3 + q1 * before) * inverse.jerk,
-                    (t3 + q1 * behind) * inverse.jerk,
+                    (t3 + q1 * after) * inverse.jerk,
                 ],
                 y1: 1.5 * h * t2 * inverse.jerk,
                 y2: h * t1 * inverse.jerk,

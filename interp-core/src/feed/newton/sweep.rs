@@ -49,7 +49,7 @@ impl Sweep {
         Some(slope * plan.inverse_step)
     }
 
-    /// Jumps behind the node.
+    /// Jumps after the node.
     pub(crate) fn jumps(&self, plan: &Plan) -> u16 {
         let mut knot = self.knot;
         while plan.knot(knot).is_some_and(|knot| knot.interval == self.node) {
@@ -74,15 +74,15 @@ pub(super) fn local(values: &[f32], node: u16, intervals: u16) -> Local {
     let at = |index: usize| values.get(index).copied().unwrap_or(0.0);
     let index = usize::from(node);
     let (here, next) = (at(index), at(index + 1));
-    let behind = at(index + 2) - 2.0 * next + here;
+    let after = at(index + 2) - 2.0 * next + here;
     let before = match index.checked_sub(1) {
         Some(previous) => at(previous) - 2.0 * here + next,
-        None => behind,
+        None => after,
     };
     Local {
         c: 0.5 * (here + next),
         c1: next - here,
-        c2: [before, if node < intervals { behind } else { before }],
+        c2: [before, if node < intervals { after } else { before }],
     }
 }
 

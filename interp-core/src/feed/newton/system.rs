@@ -35,7 +35,7 @@ pub(super) fn scatter_node(lists: &mut Lists, node: u16, intervals: u16, sums: &
         k11,
         sides,
     } = *sums;
-    let [before, behind] = sides;
+    let [before, after] = sides;
     add(lists, GRADIENT, node, 0.5 * g0 - g1);
     add(lists, GRADIENT, node + 1, 0.5 * g0 + g1);
     add(lists, h0, node, 0.25 * k00 - k01 + k11);
@@ -55,7 +55,7 @@ pub(super) fn scatter_node(lists: &mut Lists, node: u16, intervals: u16, sums: &
         add(lists, h2, previous, k02 + k12 + k22);
     }
     if node < intervals {
-        let Side { g2, k02, k12, k22 } = behind;
+        let Side { g2, k02, k12, k22 } = after;
         let k02 = 0.5 * k02;
         add(lists, GRADIENT, node, g2);
         add(lists, GRADIENT, node + 1, -2.0 * g2);

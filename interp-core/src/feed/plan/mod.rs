@@ -4,7 +4,7 @@ mod cursor;
 mod motion;
 
 use super::limits::{FeedChange, MotionLimits};
-use super::pace::{Course, Use};
+use super::pace::{Trajectory, Use};
 use super::profile::{SlotAt, Span};
 use super::stations::Stations;
 use super::{MM_PER_Q10, Q10_BITS, Q10_PER_MM, to_q10};
@@ -311,7 +311,7 @@ impl Plan {
     }
 }
 
-impl Course for Plan {
+impl Trajectory for Plan {
     type Cursor = Cursor;
 
     fn advance(&self, cursor: &mut Cursor, seconds: f32) {
@@ -341,7 +341,7 @@ impl Course for Plan {
 }
 
 impl Plan {
-    /// Moves on at this pace; see [`Course::advance`].
+    /// Moves on at this pace; see [`Trajectory::advance`].
     fn advance_at(&self, pace: &[f32], cursor: &mut Cursor, seconds: f32) {
         let by = seconds * self.inverse_step;
         let intervals = by * self.interval_of(pace, cursor.interval).speed(cursor.x);

@@ -23,7 +23,7 @@ const KNOT_BITS: u32 = 7;
 const _: () = assert!(KNOTS_MAX < 1 << KNOT_BITS);
 
 impl Plan {
-    /// Use of these limits at this pace; see [`use_at`](crate::feed::pace::Course::use_at).
+    /// Use of these limits at this pace; see [`use_at`](crate::feed::pace::Trajectory::use_at).
     pub(super) fn use_of(
         &self,
         pace: &[f32],
@@ -58,7 +58,7 @@ impl Plan {
         most
     }
 
-    /// What the limits leave to the derivatives of the pace; see [`span_at`](crate::feed::pace::Course::span_at).
+    /// What the limits leave to the derivatives of the pace; see [`span_at`](crate::feed::pace::Trajectory::span_at).
     pub(super) fn span_of(&self, limits: &MotionLimits, cursor: &Cursor, slot: &SlotAt, room: &Use) -> Span {
         let SlotAt {
             r,

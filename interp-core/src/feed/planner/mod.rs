@@ -8,7 +8,7 @@ use super::deadlines::Deadlines;
 use super::limits::{FeedChange, MotionLimits};
 use super::lists::{LIST, Lists, draft, draft_mut};
 use super::newton::{self, Reach, Sweep};
-use super::pace::{Course, Use};
+use super::pace::{Trajectory, Use};
 use super::plan::{COEFFICIENTS, Cursor, Lead, Plan};
 use super::road::GateSearch;
 use super::walk::Walker;
@@ -171,7 +171,7 @@ impl Planner {
                 Stage::Reach
             }
             Stage::Reach => self.reach_at_node(plan),
-            Stage::Take => self.take(plan, deadlines),
+            Stage::Take => self.end_step(plan, deadlines),
             Stage::Check => {
                 let is_done = self.check(plan);
                 if is_done { Stage::Finish } else { Stage::Check }
@@ -302,9 +302,9 @@ impl Planner {
         self.sweep = Sweep::START;
     }
 
-    /// Takes the step, and begins the next one or the check.
-    fn take(&mut self, plan: &mut Plan, deadlines: Deadlines) -> Stage {
-        newton::take(plan, &mut self.lists, self.reach.step());
+    /// Applies the step, and begins the next one or the check.
+    fn end_step(&mut self, plan: &mut Plan, deadlines: Deadlines) -> Stage {
+        newton::apply_step(plan, &mut self.lists, self.reach.step());
         newton::clear(&mut self.lists);
         self.step += 1;
         self.of_step = deadlines.spent.saturating_sub(self.taken);

@@ -4,7 +4,7 @@ use std::vec::Vec;
 
 use super::{PLACES, T, optimum};
 use crate::feed::curve::{Curve, CurveLimits};
-use crate::feed::pace::{Course, Pace};
+use crate::feed::pace::{Pace, Trajectory};
 use crate::feed::profile::Profiles;
 
 /// A hold at a time of a link, and a resume: greatest fractions of velocity, acceleration and jerk, by differences over `apart` periods; and the time of the hold, s.

@@ -32,7 +32,7 @@ fn limits_of(feed: f32, acceleration: f32, jerk: f32) -> MotionLimits {
     MotionLimits::new(&axes, feed, T as f32)
 }
 
-/// Greatest fractions of velocity, acceleration and jerk of samples, rests before and behind included.
+/// Greatest fractions of velocity, acceleration and jerk of samples, rests before and after included.
 fn uses(path: &Path, arcs: &[f64], limits: &MotionLimits) -> [f64; 3] {
     let mut q: Vec<[f64; 3]> = std::vec![path.at(0.0); 3];
     q.extend(arcs.iter().map(|s| path.at(*s)));

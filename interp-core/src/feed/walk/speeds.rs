@@ -142,12 +142,12 @@ impl Walker {
         let time = FLAT * (self.acceleration / self.jerk).at_most(MEAN_MAX);
         // With the first station beyond, so that the speed is held over the whole of the cell before it.
         let before = stations.get(station.saturating_sub(1)).arc_nm;
-        let behind = stations
+        let after = stations
             .get((station + 1).min(stations.count().saturating_sub(1)))
             .arc_nm;
         if start > 0.0 && between(0, before) < start * time {
             start * start
-        } else if end > 0.0 && between(behind, stations.length_nm()) < end * time {
+        } else if end > 0.0 && between(after, stations.length_nm()) < end * time {
             end * end
         } else {
             0.0

@@ -1,7 +1,7 @@
 //! A job's region: the part of the surface that is machined, as the edges of closed polygons in the store, and its intervals on a line of constant side
 //! parameter. It is one or more cells, machined one after the other, so that the tool need not cross a hole on each line.
 //!
-//! Words behind the patches, four a record:
+//! Words after the patches, four a record:
 //!
 //! | record | content |
 //! |---|---|
@@ -229,7 +229,7 @@ impl<'a> RegionWords<'a> {
         }
     }
 
-    /// The cell whose head is this record; `None` behind the last one.
+    /// The cell whose head is this record; `None` after the last one.
     pub(crate) fn cell(&self, at: u16) -> Option<CellWords<'a>> {
         let (head, rest) = self.records.get(usize::from(at)..)?.split_first()?;
         let [count, ..] = *head;

@@ -215,13 +215,13 @@ impl ScanLine {
             if from > self.side {
                 return Ok(false);
             }
-            self.take(&edge)?;
+            self.add_edge(&edge)?;
         }
         Ok(true)
     }
 
     /// Takes in the next edge, which begins below the line or at it.
-    fn take(&mut self, edge: &Edge) -> Result<(), BadLine> {
+    fn add_edge(&mut self, edge: &Edge) -> Result<(), BadLine> {
         if edge.meets(self.side) {
             let place = self.active.get_mut(usize::from(self.count)).ok_or(BadLine)?;
             *place = self.taken;

@@ -29,7 +29,7 @@ const LEVEL: f32 = 1.002;
 /// Factor on the step of a front that stays straight: it uses the whole limit but for an error.
 const LEVEL_MORE: f32 = 1.0034;
 /// Rows of a sweep, or places without a crest, in one portion.
-const CHUNK: u16 = 16;
+const ROWS_A_PORTION: u16 = 16;
 /// Greatest slope.
 const SLOPE_MAX: f32 = 1e9;
 /// Least advance of a front, as a share of the whole side parameter.
@@ -137,7 +137,7 @@ pub(crate) struct Advance {
     poles: [bool; 2],
     /// The boundary ahead is a single point, and the first line.
     is_point_ahead: bool,
-    is_point_behind: bool,
+    is_point_after: bool,
     /// Every station steps as far as the point, or is covered; some come within a step of it; the next pass is the point.
     reaches_point: bool,
     is_near_point: bool,
@@ -188,7 +188,7 @@ impl Advance {
         has_gaps: false,
         poles: [false; 2],
         is_point_ahead: false,
-        is_point_behind: false,
+        is_point_after: false,
         reaches_point: true,
         is_near_point: false,
         is_on_point: false,
@@ -320,7 +320,7 @@ impl Advance {
             }
             Task::Done => {}
             _ => {
-                for _ in 0..CHUNK {
+                for _ in 0..ROWS_A_PORTION {
                     let task = self.task;
                     self.sweep(job, table);
                     if self.task != task {

@@ -8,16 +8,16 @@ pub(crate) const LENGTH: u32 = 3_900;
 pub(crate) const STEP: [u32; 4] = [7_300, 4_400, 4_800, 4_900];
 /// The evaluations of a crest, in order.
 pub(crate) const CREST: [u32; 3] = [5_100, 6_300, 7_200];
-/// Rows of the sweeps, a chunk.
+/// Rows of the sweeps, a portion.
 pub(crate) const COPY: u32 = 4_300;
 pub(crate) const SWEEP: u32 = 7_400;
 pub(crate) const COMPARE: u32 = 15_200;
 pub(crate) const HULL: u32 = 8_400;
 pub(crate) const SUBSTITUTE: u32 = 11_000;
 
-/// Stations of a front, in search for its parts, a chunk.
+/// Stations of a front, in search for its parts, a portion.
 pub(crate) const PART: u32 = 7_500;
-/// Edges of a region against a front, a chunk.
+/// Edges of a region against a front, a portion.
 pub(crate) const CLIP: u32 = 9_000;
 
 /// Cycles of an evaluation; those after the last one are the last.

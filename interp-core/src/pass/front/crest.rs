@@ -5,7 +5,7 @@ use core::ops::Deref;
 use crate::fault::Result;
 use crate::job::program::Job;
 use crate::math::arith::{power_of_two, sqrt, to_f32, truncated};
-use crate::math::number::{Bounded, MM_PER_NM, to_f32 as wide_to_f32};
+use crate::math::number::Bounded;
 use crate::math::vec3::Vec3;
 use crate::pass::edge::Seen;
 use crate::pass::front::frame::{Frame, FreePatch};
@@ -233,7 +233,7 @@ impl CrestSearch {
         let Ok(ball) = tools.frame(table, foot, curve.at) else {
             return (f32::INFINITY, interval);
         };
-        let chord = apart(&ball.point, &point.point);
+        let chord = Vec3::between_q30(&point.point, &ball.point);
         let radius = sqrt(point.offset.dot(point.offset));
         let seen = Seen {
             chord_mm: 0.0,
@@ -322,11 +322,4 @@ pub(crate) fn shifted<W: Deref<Target = [i32]>>(
     }
     let share = (at / length).at_most(1.0).at_least(0.0);
     ((interval, truncated(share * WITHIN)), false)
-}
-
-/// From one contact to another, mm.
-fn apart([x, y, z]: &[i64; 3], [x0, y0, z0]: &[i64; 3]) -> Vec3 {
-    const MM_PER_Q30: f32 = MM_PER_NM / 1_073_741_824.0;
-    let mm = |to: &i64, from: &i64| wide_to_f32(to.wrapping_sub(*from)) * MM_PER_Q30;
-    Vec3::new(mm(x, x0), mm(y, y0), mm(z, z0))
 }

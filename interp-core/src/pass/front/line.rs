@@ -35,7 +35,7 @@ pub(crate) struct FrontPiece {
     interval: u16,
     /// The span of the side parameter.
     cursor: SideCursor,
-    /// The piece ends at the knot before the span, or behind it.
+    /// The piece ends at the knot before the span, or after it.
     ends_at_knot: Option<bool>,
     /// Whether start and end are on the last side boundary.
     are_on_boundary: [bool; 2],
@@ -91,8 +91,8 @@ impl FrontLine {
         }
         let mut cursor = piece.cursor;
         let number = piece.number.saturating_add(1);
-        if let Some(behind) = piece.ends_at_knot {
-            cursor.step(job, behind);
+        if let Some(after) = piece.ends_at_knot {
+            cursor.step(job, after);
         }
         let (interval, start) = match end.checked_add(1) {
             Some(from) => {
@@ -145,12 +145,12 @@ impl FrontLine {
         let cubic = self.cubic(job, interval);
         let mut ends_at_knot = None;
         let [low, high] = [within(start), within(end)];
-        if let Some((at, behind)) = self.leaves(job, &cubic, &cursor, [low, high]) {
+        if let Some((at, after)) = self.leaves(job, &cubic, &cursor, [low, high]) {
             let place = self.stations.place_within(interval, at);
             let fraction = turned(place.fraction);
             if fraction < end {
                 (end, is_end) = (fraction.max(start), false);
-                ends_at_knot = Some(behind);
+                ends_at_knot = Some(after);
             }
         }
         let [from_boundary, to_boundary] = self.are_on_boundary;
@@ -189,7 +189,7 @@ impl FrontLine {
             (Some(_), None) => to,
             (None, None) => return None,
         };
-        let behind = outside(beyond)?;
+        let after = outside(beyond)?;
         let (mut low, mut high) = (from, beyond);
         for _ in 0..BISECTIONS {
             let middle = i32::midpoint(low, high);
@@ -199,7 +199,7 @@ impl FrontLine {
                 low = middle;
             }
         }
-        Some((low, behind))
+        Some((low, after))
     }
 
     /// The side parameter on a piece, as a function of the path.

@@ -13,7 +13,7 @@
 //!
 //! | file | holds |
 //! |---|---|
-//! | [`table`] | the stations, in the job store behind the job's words |
+//! | [`table`] | the stations, in the job store after the job's words |
 //! | [`side`] | the side parameter as one integer over all spans |
 //! | [`frame`] | the metric at a surface point |
 //! | [`foot`] | the step of a front at a place |

@@ -1,4 +1,4 @@
-//! The parts of a front before the boundary, each a pass, sought a chunk of stations at a time.
+//! The parts of a front before the boundary, each a pass, sought in portions of stations.
 
 use core::ops::Deref;
 
@@ -12,7 +12,7 @@ use crate::pass::route::Route;
 use crate::sample::SpanParameter;
 
 /// Stations of a portion.
-const CHUNK: u8 = 8;
+const STATIONS_A_PORTION: u8 = 8;
 
 /// Stage of the search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,7 +23,7 @@ enum Stage {
     Before,
     /// Stations of the part.
     Within,
-    /// Stations beyond the boundary, behind the part.
+    /// Stations beyond the boundary, after the part.
     Behind,
     /// Stations of a part whose ends are known, up to this one.
     Known(u16),
@@ -114,7 +114,7 @@ impl PartSearch {
     }
 
     /// Takes the found part, `None` if the front has no further part, and whether it is the last one. If it is not, the search for the next one begins.
-    pub(crate) fn take(&mut self, stations: Stations, cursor: SideCursor) -> (Option<Route>, bool) {
+    pub(crate) fn next_route(&mut self, stations: Stations, cursor: SideCursor) -> (Option<Route>, bool) {
         let front = FrontLine {
             direction: self.direction,
             stations,
@@ -140,9 +140,9 @@ impl PartSearch {
         (route, is_last)
     }
 
-    /// Looks at a chunk of stations.
+    /// Looks at a portion of the stations.
     pub(crate) fn work<W: Deref<Target = [i32]>>(&mut self, job: &Job<'_>, table: &Table<W>) {
-        for _ in 0..CHUNK {
+        for _ in 0..STATIONS_A_PORTION {
             match self.stage {
                 Stage::Idle | Stage::Found => return,
                 Stage::Before | Stage::Within | Stage::Behind | Stage::Known(_) => self.look(job, table),
@@ -214,7 +214,7 @@ impl PartSearch {
         }
     }
 
-    /// Counts the piece behind a station.
+    /// Counts the piece after a station.
     fn count(&mut self, job: &Job<'_>, front: i32) {
         self.cursor.seek(job, &self.direction, fine(front));
         let span = self.cursor.span();

@@ -48,7 +48,7 @@ pub(crate) enum NextRoute {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FrontSequence {
     line: Line,
-    /// Columns of the front that the tool is on, or was last, and of the latest one, from which the next is made. They differ behind fronts that hold no pass.
+    /// Columns of the front that the tool is on, or was last, and of the latest one, from which the next is made. They differ after fronts that hold no pass.
     on: Pair,
     from: Pair,
     /// Part of the surface, from 0, and fronts so far.
@@ -134,7 +134,7 @@ impl FrontSequence {
         }
     }
 
-    /// A portion of the next front, into the words behind the job's. Returns its cycles.
+    /// A portion of the next front, into the words after the job's. Returns its cycles.
     pub(crate) fn work(&mut self, job: &Job<'_>, words: &mut [i32], lines: &mut RegionLines) -> u32 {
         let stations = self.advance.stations();
         if self.part_search.has_work() {
@@ -303,7 +303,7 @@ impl FrontSequence {
         if !self.part_search.is_found() {
             return Ok(NextRoute::NotYet);
         }
-        let (route, is_last) = self.part_search.take(self.advance.stations(), self.cursor);
+        let (route, is_last) = self.part_search.next_route(self.advance.stations(), self.cursor);
         self.is_last_part = is_last;
         self.seek_first_part(job);
         let route = route.ok_or(Fault::new(FaultKind::IntervalTooSmall, 0.0))?;

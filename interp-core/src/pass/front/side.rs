@@ -176,20 +176,20 @@ impl SideCursor {
         self.width
     }
 
-    /// Moves to the span behind this one, or to that before it, if there is one.
-    pub(crate) fn step(&mut self, job: &Job<'_>, behind: bool) {
-        if behind && self.span + 1 < job.header.side_spans {
+    /// Moves to the span after this one, or to that before it, if there is one.
+    pub(crate) fn step(&mut self, job: &Job<'_>, after: bool) {
+        if after && self.span + 1 < job.header.side_spans {
             self.span += 1;
             self.start = self.start.saturating_add(self.width);
             self.width = self.width_of(job, self.span);
-        } else if !behind && self.span > 0 {
+        } else if !after && self.span > 0 {
             self.span -= 1;
             self.width = front_side_width(job.side_width(self.span), self.scale);
             self.start = self.start.saturating_sub(self.width);
         }
     }
 
-    /// Whether a distance from the first front, fine units, is on a span behind this one (true) or before it (false); `None` on this span, and where there is no further span.
+    /// Whether a distance from the first front, fine units, is on a span after this one (true) or before it (false); `None` on this span, and where there is no further span.
     pub(crate) fn side_of(&self, job: &Job<'_>, direction: &Direction, distance: i64) -> Option<bool> {
         let from_start = direction.whole(distance).wrapping_sub(fine(self.start));
         if from_start < 0 && self.span > 0 {

@@ -113,7 +113,7 @@ fn end_slope([near, far]: [f32; 2], [first, second]: [f32; 2]) -> f32 {
     near * (whole / (first * second)) - (near + far) * (first / (second * whole))
 }
 
-/// A sweep of the elimination, forwards (which also sets the slopes at both ends) or backwards: the rows of a chunk from `station`. Returns whether rows are left.
+/// A sweep of the elimination, forwards (which also sets the slopes at both ends) or backwards: the rows of a portion from `station`. Returns whether rows are left.
 pub(crate) fn eliminate<W: DerefMut<Target = [i32]>>(
     table: &mut Table<W>,
     job: &Job<'_>,

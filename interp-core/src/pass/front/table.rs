@@ -1,4 +1,4 @@
-//! The stations of the fronts, a column of words for each quantity, in the job store behind the job's words.
+//! The stations of the fronts, a column of words for each quantity, in the job store after the job's words.
 
 use core::ops::{Deref, DerefMut};
 

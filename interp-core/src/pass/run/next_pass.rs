@@ -59,7 +59,7 @@ impl Run {
         }
         match self.next_pass {
             NextPass::Found => {
-                let Some(route) = self.lines.take(job.header) else {
+                let Some(route) = self.lines.next_route(job.header) else {
                     return Ok(NextRoute::None);
                 };
                 self.next_pass = NextPass::Sought;
@@ -145,7 +145,7 @@ impl Run {
     }
 
     /// The planning of one period without axis limits, of which some cycles are spent already: scans the pass for the step to the next one, or makes the next
-    /// front in the words behind the job's.
+    /// front in the words after the job's.
     pub(crate) fn plan(&mut self, job: &Job<'_>, rest: &mut [i32], spent: u32) {
         let has_work = match &mut self.planning {
             PassPlanning::Fronts(fronts) => return fronts.plan(job, rest, &mut self.lines, spent),
@@ -282,7 +282,7 @@ impl Run {
         }
     }
 
-    /// Makes a portion of the next front, in the words behind the job's. Returns its cycles.
+    /// Makes a portion of the next front, in the words after the job's. Returns its cycles.
     pub(crate) fn make_front(&mut self, job: &Job<'_>, rest: &mut [i32]) -> u32 {
         match &mut self.planning {
             PassPlanning::Fronts(fronts) => fronts.work(job, rest, &mut self.lines),
@@ -379,7 +379,7 @@ impl Run {
         if let PassPlanning::Fronts(fronts) = &mut self.planning {
             return fronts.start(job, &mut self.lines);
         }
-        let of_region = self.lines.take(job.header);
+        let of_region = self.lines.next_route(job.header);
         of_region.unwrap_or_else(|| Route::of_pass(job.header, 0, SpanParameter::default()))
     }
 

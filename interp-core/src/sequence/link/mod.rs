@@ -6,7 +6,7 @@ mod straight;
 
 use crate::fault::{Fault, FaultKind, Result};
 use crate::feed::curve::{Curve, CurveCursor};
-use crate::feed::pace::{Course as _, Pace};
+use crate::feed::pace::{Pace, Trajectory as _};
 use crate::feed::profile::Profiles;
 use crate::feed::to_q10;
 use crate::math::arith::sqrt;

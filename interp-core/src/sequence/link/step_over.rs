@@ -4,7 +4,7 @@ use super::{NOTHING_NM, Progress, distance, to_mm};
 use crate::fault::Result;
 use crate::feed::curve::{Curve, CurveCursor, CurveLimits};
 use crate::feed::limits::{MotionLimits, SLOPE_MIN};
-use crate::feed::pace::Course as _;
+use crate::feed::pace::Trajectory as _;
 use crate::feed::profile::Profiles;
 use crate::feed::stations::{Derivatives, WINDOW, Window};
 use crate::job::AxisLimits;
@@ -43,7 +43,7 @@ enum Task {
     Begin,
     /// Locate the ends, for its length.
     Ends,
-    /// Find whether the curvature jumps at the knot behind the n-th span of the step-over.
+    /// Find whether the curvature jumps at the knot after the n-th span of the step-over.
     Knot(u16),
     /// Locate the n-th station.
     Station(u8),
@@ -344,12 +344,12 @@ impl BoundaryStepOver {
             span,
             fraction: u64::MAX,
         };
-        let behind = SpanParameter {
+        let after = SpanParameter {
             span: span + 1,
             fraction: 0,
         };
         let mut sides = [0.0; 2];
-        for (of_side, parameter) in sides.iter_mut().zip([before, behind]) {
+        for (of_side, parameter) in sides.iter_mut().zip([before, after]) {
             let at = self.move_to(job, parameter)?;
             let (contact, located) = self.patch.evaluate_on_line(at)?;
             if parameter.span > span {
@@ -361,17 +361,17 @@ impl BoundaryStepOver {
                 Along::Path => contact.along,
             };
         }
-        let [bend_before, bend_behind] = sides;
-        let jump = (bend_behind - bend_before).abs();
+        let [bend_before, bend_after] = sides;
+        let jump = (bend_after - bend_before).abs();
         // A NaN, at a pole, is none.
         if jump > self.jump {
             let width = |span| self.along.width(job, span);
             self.jump_beside = self.jump;
             self.jump = jump;
             self.jump_at = if self.goes_back() {
-                schedule::apart(behind, self.from, width) / self.reach
+                schedule::apart(after, self.from, width) / self.reach
             } else {
-                schedule::apart(self.from, behind, width) / self.reach
+                schedule::apart(self.from, after, width) / self.reach
             };
         } else if jump > self.jump_beside {
             self.jump_beside = jump;

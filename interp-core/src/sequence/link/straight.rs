@@ -3,7 +3,7 @@
 use super::{NOTHING_NM, Progress, Whole, to_mm};
 use crate::feed::curve::{Curve, CurveCursor, CurveLimits};
 use crate::feed::limits::SLOPE_MIN;
-use crate::feed::pace::Course as _;
+use crate::feed::pace::Trajectory as _;
 use crate::feed::to_q10;
 use crate::job::AxisLimits;
 use crate::math::arith::sqrt;

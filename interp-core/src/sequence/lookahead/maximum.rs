@@ -28,7 +28,7 @@ impl LastPlaces {
         count: 0,
     };
 
-    /// Appends a place; the oldest is dropped. One that is not behind the last begins anew, where a patch is looked at again.
+    /// Appends a place; the oldest is dropped. One that is not after the last begins anew, where a patch is looked at again.
     fn push(&mut self, place: Place) {
         let [_, before, last] = self.places;
         self.count = if self.count > 0 && place.0 > last.0 {
@@ -45,15 +45,15 @@ impl LastPlaces {
         if self.count < 3 || at <= start || end <= at {
             return None;
         }
-        let (before, behind) = (fraction_to_f32(at - start), fraction_to_f32(end - at));
+        let (before, after) = (fraction_to_f32(at - start), fraction_to_f32(end - at));
         // Slopes of the chords, and the second difference.
-        let (rise, fall) = ((middle - first) / before, (middle - last) / behind);
-        let bend = (rise + fall) / (before + behind);
+        let (rise, fall) = ((middle - first) / before, (middle - last) / after);
+        let bend = (rise + fall) / (before + after);
         // Slope at the middle.
-        let slope = (rise * behind - fall * before) / (before + behind);
+        let slope = (rise * after - fall * before) / (before + after);
         let away = 0.5 * slope / bend;
         let is_greater = middle + 0.5 * slope * away > most * (1.0 + WORTH);
-        if !(bend > 0.0 && is_greater && -before < away && away < behind) {
+        if !(bend > 0.0 && is_greater && -before < away && away < after) {
             return None;
         }
         let fraction = if away < 0.0 {
@@ -67,8 +67,8 @@ impl LastPlaces {
     /// Puts a place between the others: those around the greatest are kept.
     fn insert(&mut self, place: Place) {
         let [start, middle, end] = self.places;
-        let is_behind = place.0 > middle.0;
-        self.places = match (place.1 > middle.1, is_behind) {
+        let is_after = place.0 > middle.0;
+        self.places = match (place.1 > middle.1, is_after) {
             (true, true) => [middle, place, end],
             (true, false) => [start, place, middle],
             (false, true) => [start, middle, place],

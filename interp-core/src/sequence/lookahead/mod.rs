@@ -34,11 +34,11 @@ use within::WholePass;
 /// Length of a cell between kept stations that is short enough, mm.
 const CELL_KEPT_MM: f32 = 0.3;
 /// Most stations of a pass, and most patches of which both ends are kept.
-const STATIONS: u16 = 168;
+#[allow(clippy::cast_possible_truncation, reason = "168")]
+const STATIONS: u16 = STATIONS_MAX as u16;
 const PATCHES: u16 = STATIONS / 2;
 /// Least length of a stretch of a pass on a front that does not end at a knot, mm.
 const STRETCH_MIN_MM: f32 = 0.6;
-const _: () = assert!(STATIONS as usize == STATIONS_MAX);
 /// Most patches of a pass with turns: both ends of each are kept.
 const SPANS_TURNED: u16 = (STATIONS - 2 * turn::STATIONS) / 2;
 
@@ -69,7 +69,7 @@ enum Task {
     Turn(u8),
     /// Bound the turn's speed by a station of each half.
     Bound(u16),
-    /// Append a station of the half of the turn behind the pass.
+    /// Append a station of the half of the turn after the pass.
     Tail(u16),
     Done,
 }
@@ -164,7 +164,7 @@ pub(crate) struct Lookahead {
     /// Side parameter of the pass, and whether the pass before is on the same line.
     line: Option<SpanParameter>,
     goes_on: bool,
-    /// The turn before the pass; then the one behind it, its ends and the length that is tried.
+    /// The turn before the pass; then the one after it, its ends and the length that is tried.
     turn: Turn,
     ends: [TurnEnd; 2],
     length: f32,
@@ -473,7 +473,7 @@ impl Lookahead {
         Ok(match lines.seek(job, out.pass)? {
             NextPass::Sought => Task::Seek,
             NextPass::Found => {
-                out.next = lines.take(job.header);
+                out.next = lines.next_route(job.header);
                 let rows = estimator.map(StepOverEstimator::rows);
                 let is_joined = |route: &Route| lines.joins(job.header, &out.route, route, rows);
                 out.steps_over = job.header.pattern == Pattern::Zigzag
@@ -572,7 +572,7 @@ impl Lookahead {
         (self.has_bend, self.has_jump) = (self.bends, self.jumps);
         let header = job.header;
         out.interval = interval_of(self.maximum.inv_interval_sq);
-        if let Some(route) = lines.take(header) {
+        if let Some(route) = lines.next_route(header) {
             out.next = Some(route);
             return Ok(true);
         }
@@ -635,9 +635,9 @@ pub(crate) fn has_turns(job: &Job<'_>) -> bool {
 /// # Errors
 /// [`FaultKind::DegenerateSurface`] with the value 0 where an axis would be faster than its limit in the period that crosses the knot.
 pub(crate) fn check_crease(job: &Job<'_>, axes: &AxisLimits, sides: [&[i32; 3]; 2]) -> Result<()> {
-    let [before, behind] = sides;
-    for ((before, behind), velocity) in before.iter().zip(behind).zip(&axes.velocity_mm_s) {
-        let apart_mm = to_f32(i64::from(*behind) - i64::from(*before)) * MM_PER_NM;
+    let [before, after] = sides;
+    for ((before, after), velocity) in before.iter().zip(after).zip(&axes.velocity_mm_s) {
+        let apart_mm = to_f32(i64::from(*after) - i64::from(*before)) * MM_PER_NM;
         if apart_mm.abs() > velocity * job.header.period_s {
             return Err(Fault::new(FaultKind::DegenerateSurface, 0.0));
         }

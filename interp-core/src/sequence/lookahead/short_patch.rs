@@ -11,7 +11,7 @@ use crate::math::number::{Bounded, MM_PER_NM};
 /// Share of a patch that a period takes at most, and the least length of one between two others, mm.
 const PATCH_SHARE: f32 = 0.95;
 const PATCH_MIN_MM: f32 = 1e-4;
-/// How far before and behind a patch the pass is as slow, in its lengths: the nodes of a plan are some periods apart.
+/// How far before and after a patch the pass is as slow, in its lengths: the nodes of a plan are some periods apart.
 const REACH: f32 = 10.0;
 /// Most stations that one patch slows down.
 const STATIONS_SLOW: u16 = 24;

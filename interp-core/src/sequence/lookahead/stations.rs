@@ -162,7 +162,7 @@ impl Lookahead {
         let count = self.window.count();
         let last = count.saturating_sub(1);
         let middle = WINDOW / 2;
-        // Where the window is full for the first time, also those before its middle; at the patch's end also those behind it.
+        // Where the window is full for the first time, also those before its middle; at the patch's end also those after it.
         let from = if usize::from(self.station) + 1 == count {
             0
         } else {
@@ -180,8 +180,8 @@ impl Lookahead {
 
     /// Stores the derivatives at a place of the window, if its station is kept or belongs to a group.
     pub(super) fn differentiate(&mut self, at: u8, out: &mut PassPlan) {
-        let behind = self.window.count().saturating_sub(1 + usize::from(at));
-        let station = self.station.saturating_sub(u16::try_from(behind).unwrap_or(0));
+        let after = self.window.count().saturating_sub(1 + usize::from(at));
+        let station = self.station.saturating_sub(u16::try_from(after).unwrap_or(0));
         if out.group > 1 {
             let stations = &mut out.plan.stations;
             let q = self.window.derivatives(usize::from(at));
@@ -224,15 +224,15 @@ impl Lookahead {
     }
 
     /// Whether the direction of the path jumps at a knot by more than the error of its differences: the lines of a smooth surface may bend there.
-    fn bends_at_knot(&self, before: &Derivatives, behind: &Derivatives) -> bool {
+    fn bends_at_knot(&self, before: &Derivatives, after: &Derivatives) -> bool {
         let cell = self.window.spacing_mm();
         let (mut jump, mut first) = (0.0_f32, 0.0_f32);
         let (mut turn, mut change) = (0.0_f32, 0.0_f32);
-        for (before, behind) in before.iter().zip(behind) {
-            jump = jump.at_least((behind[0] - before[0]).abs());
-            first = first.at_least(before[0].abs()).at_least(behind[0].abs());
-            turn = turn.at_least(before[1].abs()).at_least(behind[1].abs());
-            change = change.at_least(before[2].abs()).at_least(behind[2].abs());
+        for (before, after) in before.iter().zip(after) {
+            jump = jump.at_least((after[0] - before[0]).abs());
+            first = first.at_least(before[0].abs()).at_least(after[0].abs());
+            turn = turn.at_least(before[1].abs()).at_least(after[1].abs());
+            change = change.at_least(before[2].abs()).at_least(after[2].abs());
         }
         let (turn, change) = (turn * cell / first, change * cell * cell / first);
         // A front bends little, but its stretches have few cells.

@@ -1,4 +1,4 @@
-//! A run that begins within a pass: the rest of the pass is looked at after the whole of it, which has given the pass behind it.
+//! A run that begins within a pass: the rest of the pass is looked at after the whole of it, which has given the pass after it.
 
 use super::{Lookahead, PassPlan};
 use crate::fault::{Fault, FaultKind, Result};
@@ -8,7 +8,7 @@ use crate::pass::route::Route;
 use crate::pass::step_over::PassMaximum;
 use crate::sample::SpanParameter;
 
-/// What a whole pass gives to the passes behind it.
+/// What a whole pass gives to the passes after it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct WholePass {
     interval: f32,
@@ -52,7 +52,7 @@ impl Lookahead {
         Ok(())
     }
 
-    /// Ends the look at the rest of a pass: to the passes behind it, it is as if the whole had been driven.
+    /// Ends the look at the rest of a pass: to the passes after it, it is as if the whole had been driven.
     pub(super) fn close_within(&mut self, whole: &WholePass, out: &mut PassPlan) {
         self.whole = None;
         self.maximum = whole.maximum;

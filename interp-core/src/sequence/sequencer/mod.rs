@@ -537,8 +537,8 @@ impl Sequencer {
         match self.phase {
             Phase::StepOver => Some(now),
             Phase::Turn => {
-                let is_behind = self.follower.arc_q10() >= now.tail_q10;
-                Some(next).filter(|_| now.turns() && is_behind && is_located)
+                let is_past = self.follower.arc_q10() >= now.tail_q10;
+                Some(next).filter(|_| now.turns() && is_past && is_located)
             }
             Phase::Hop | Phase::Leg(_) | Phase::AwaitGoal(_) => {
                 Some(next).filter(|_| self.goal == Goal::Pass && is_located)

@@ -15,7 +15,7 @@ use crate::pass::run::Run;
 pub(super) struct NextStep {
     /// The pace that it is for.
     pace: f32,
-    /// The follower behind it, and the arc that the tool moves by, mm.
+    /// The follower after it, and the arc that the tool moves by, mm.
     follower: Follower,
     moved: f32,
 }

@@ -44,7 +44,7 @@ fn heads(prepared: &Prepared) -> impl Iterator<Item = i32> + '_ {
 struct Strips(Vec<Strip>);
 
 impl Strips {
-    /// Those that hold the rows that each pass behind the first one needs.
+    /// Those that hold the rows that each pass after the first one needs.
     fn new(prepared: &Prepared, window: u16, needed: &[RowsNeeded]) -> Self {
         let end = prepared.header.side_spans - 1;
         let first = heads(prepared).next().unwrap_or(0) >> FRACTION_BITS;
@@ -55,8 +55,8 @@ impl Strips {
             // What lies beyond a gap is a strip of its own only where the core's window begins anew.
             let most = needed.before.saturating_add(window - 1);
             match strips.last_mut() {
-                Some([_, behind]) if needed.own >= needed.before && needed.own <= most.max(*behind + 1) => {
-                    *behind = last.max(*behind);
+                Some([_, after]) if needed.own >= needed.before && needed.own <= most.max(*after + 1) => {
+                    *after = last.max(*after);
                 }
                 _ => strips.push([needed.own, last]),
             }
@@ -77,12 +77,12 @@ impl Strips {
                 let strip: Option<&Strip> = self.0.get(number);
                 at + usize::from(strip.and_then(|strip| strip.index(row)).unwrap_or(0))
             };
-            let behind = needed.behind.map(|row| place(at, number, row));
+            let after = needed.after.map(|row| place(at, number, row));
             if needed.own < needed.before || self.0[number].index(needed.own).is_none() {
                 at += usize::from(self.0[number].rows);
                 number = (number + 1).min(self.0.len() - 1);
             }
-            first = behind.unwrap_or_else(|| place(at, number, needed.own)).max(first);
+            first = after.unwrap_or_else(|| place(at, number, needed.own)).max(first);
             let last = needed.last.min(self.0[number].first + self.0[number].rows - 1);
             least = least.max(place(at, number, last) + 1 - first);
         }

@@ -2,7 +2,7 @@
 
 use core::ops::DerefMut;
 
-use super::{Advance, CHUNK, MEASUREMENTS, Task};
+use super::{Advance, MEASUREMENTS, ROWS_A_PORTION, Task};
 use crate::job::program::Job;
 use crate::math::arith::{to_f32, truncated};
 use crate::math::number::Bounded;
@@ -104,7 +104,7 @@ impl Advance {
         job: &Job<'_>,
         table: &mut Table<W>,
     ) -> bool {
-        for _ in 0..CHUNK {
+        for _ in 0..ROWS_A_PORTION {
             if self.search.next > 0 || self.has_crest(table, self.station) {
                 return true;
             }

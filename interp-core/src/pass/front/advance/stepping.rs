@@ -2,11 +2,12 @@
 
 use core::ops::DerefMut;
 
-use super::{Advance, CHUNK, SLOPE_MAX, Task};
+use super::{Advance, ROWS_A_PORTION, SLOPE_MAX, Task};
 use crate::job::program::Job;
 use crate::job::stations::Stations;
 use crate::math::arith::sqrt;
-use crate::math::number::{Bounded, MM_PER_NM, to_f32 as wide_to_f32};
+use crate::math::number::Bounded;
+use crate::math::vec3::Vec3;
 use crate::pass::front::crest::{CURRENT, Place, Tools};
 use crate::pass::front::foot::Found;
 use crate::pass::front::frame::{Frame, MARGIN};
@@ -75,7 +76,8 @@ impl Advance {
             self.advanced = self.advanced.at_least(self.length_mm);
             self.length_mm = 0.0;
         } else if let (Some(from), Some(to)) = (self.before, point) {
-            self.length_mm += distance_mm(&from, &to);
+            let way = Vec3::between_q30(&from, &to);
+            self.length_mm += sqrt(way.dot(way));
         }
         self.before = point;
         self.station += 1;
@@ -111,7 +113,7 @@ impl Advance {
         let frame = Frame::at(&mut self.patch, job, &mut self.cursor, direction, middle, at);
         let is_point = frame.is_ok_and(|frame| frame.e <= POLE_MAX * frame.g);
         if is_first_line {
-            self.is_point_behind = is_point;
+            self.is_point_after = is_point;
             (self.task, self.station) = (Task::Clear, 0);
         } else {
             self.is_point_ahead = is_point;
@@ -123,7 +125,7 @@ impl Advance {
     pub(super) fn pass_over<W: DerefMut<Target = [i32]>>(&mut self, table: &mut Table<W>) {
         let count = self.stations.count();
         let begun = self.station;
-        for _ in 0..CHUNK {
+        for _ in 0..ROWS_A_PORTION {
             let station = self.station >> 1;
             if self.task != Task::Step || self.foot.next > 0 || self.is_near(table, station) {
                 break;
@@ -231,7 +233,7 @@ impl Advance {
             self.reaches_point &= front >= end || is_covered;
             self.is_near_point |= front >= end.saturating_sub(step);
         }
-        self.is_near_point |= self.is_point_behind && own <= step;
+        self.is_near_point |= self.is_point_after && own <= step;
     }
 
     /// Stations and the middles between them, in turns.
@@ -292,14 +294,4 @@ fn front_at<W: DerefMut<Target = [i32]>>(
     } else {
         table.word(Column::Front, station)
     }
-}
-
-fn distance_mm(from: &[i64; 3], to: &[i64; 3]) -> f32 {
-    const MM_PER_Q30: f32 = MM_PER_NM / 1_073_741_824.0;
-    let mut sum = 0.0;
-    for (from, to) in from.iter().zip(to) {
-        let mm = wide_to_f32(to.wrapping_sub(*from)) * MM_PER_Q30;
-        sum += mm * mm;
-    }
-    sqrt(sum)
 }

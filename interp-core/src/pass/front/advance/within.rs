@@ -53,7 +53,7 @@ impl Advance {
         from <= station && station <= to
     }
 
-    /// Whether the interval behind a station is in the range.
+    /// Whether the interval after a station is in the range.
     pub(super) const fn is_interval_within(&self, station: u16) -> bool {
         let [from, to] = self.within;
         from <= station && station < to

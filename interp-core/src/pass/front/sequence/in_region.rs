@@ -314,7 +314,7 @@ impl FrontSequence {
             return NextRoute::NotYet;
         }
         self.region.is_on_line = false;
-        let (route, _) = self.part_search.take(self.advance.stations(), self.cursor);
+        let (route, _) = self.part_search.next_route(self.advance.stations(), self.cursor);
         let Some(mut route) = route else {
             return NextRoute::None;
         };
