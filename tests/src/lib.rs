@@ -243,8 +243,8 @@ impl Machine for Mock {
         Ok(())
     }
 
-    fn profile(&mut self) -> Option<Profile> {
-        self.profile
+    fn profile(&self) -> Option<&Profile> {
+        self.profile.as_ref()
     }
 
     fn keep_profile(&mut self, profile: Option<&Profile>) -> Result<(), StorageError> {
