@@ -1,7 +1,7 @@
 //! Start of a run: the axes must be at the job's home. On a whole board with step outputs.
 
 use controller::{in_process::Board, safety::DEBOUNCE_TICKS};
-use integration_tests::{HELLO, Host, MAKE_READY, dome, upload};
+use integration_tests::{HELLO, Host, LIMITS, MAKE_READY, dome, upload};
 use interp_core::{AxisLimits, Header, State, StepConfig};
 use protocol::message::{
     Activity, Configuration, InputLines, JogWay, Reason, Reply, Report, Request, Status,
@@ -18,17 +18,11 @@ fn within_limits(home_nm: [i32; 3]) -> (Header, Vec<i32>) {
     let (mut header, words) = dome();
     header.feed_mm_s = 60.0;
     header.axes = Some(AxisLimits {
-        velocity_mm_s: [100.0; 3],
         acceleration_mm_s2: [2000.0; 3],
         jerk_mm_s3: [50_000.0; 3],
-        chord_mm: 0.005,
-        overrun_mm: 0.0,
-        travel_nm: [[i32::MIN, i32::MAX]; 3],
         home_nm,
-        plunge_mm: 2.0,
-        end_nm: None,
-        end_height_nm: 0,
         safe_z_nm: SAFE_Z_NM,
+        ..LIMITS
     });
     (header, words)
 }

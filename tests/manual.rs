@@ -2,10 +2,9 @@
 
 mod rig;
 
-use interp_core::steps::StepConfig;
+use integration_tests::PROFILE;
 use protocol::message::{
-    Activity, Configuration, DoorContact, Homing, InputLines, JogWay, MotionEnd, NO_AXIS, Offsets, Profile,
-    Reason, Request,
+    Activity, DoorContact, Homing, InputLines, JogWay, MotionEnd, NO_AXIS, Offsets, Profile, Reason, Request,
 };
 
 use rig::{Fault, Rig};
@@ -17,12 +16,10 @@ const STEP_NM: i32 = 2_500;
 /// Axes of 300, 200 and 80 mm, z homed at the top.
 pub(crate) fn profile() -> Profile {
     Profile {
-        steps: StepConfig::DEFAULT.into(),
         velocity_mm_s: [100.0, 100.0, 50.0],
         acceleration_mm_s2: [1000.0, 1000.0, 500.0],
         jerk_mm_s3: [20_000.0, 20_000.0, 10_000.0],
         travel_nm: Some([[0, 300 * MM], [0, 200 * MM], [-80 * MM, 0]]),
-        configuration: Configuration::DEFAULT,
         homing: Some(Homing {
             order: [2, 0, 1],
             at_upper_end: [false, false, true],
@@ -32,11 +29,7 @@ pub(crate) fn profile() -> Profile {
             back_off_nm: [3 * MM; 3],
             survives_off: false,
         }),
-        probe_inverted: false,
-        step_inverted: 0,
-        enable_inverted: 0,
-        door: DoorContact::None,
-        spindle: None,
+        ..PROFILE
     }
 }
 

@@ -4,14 +4,12 @@
 use std::collections::HashMap;
 
 use controller::in_process::Board;
-use integration_tests::{HELLO, Host, upload};
+use integration_tests::{HELLO, Host, PROFILE, upload};
 use interp_core::{RunStart, Sample, SpanParameter, State, steps::AxisSteps, steps::StepConfig};
 use job::{Job, Pattern};
 use machine::prepare::{Prepared, prepare};
 use protocol::digest::job_digest;
-use protocol::message::{
-    Configuration, DoorContact, JobName, Journal, Offsets, Profile, Reason, Reply, Request, Status, job_mark,
-};
+use protocol::message::{JobName, Journal, Offsets, Profile, Reason, Reply, Request, Status, job_mark};
 
 use crate::pause::sample_job;
 
@@ -41,14 +39,7 @@ pub(crate) fn profile(job: &Job) -> Profile {
         velocity_mm_s,
         acceleration_mm_s2,
         jerk_mm_s3,
-        travel_nm: None,
-        configuration: Configuration::DEFAULT,
-        homing: None,
-        probe_inverted: false,
-        spindle: None,
-        step_inverted: 0,
-        enable_inverted: 0,
-        door: DoorContact::None,
+        ..PROFILE
     }
 }
 
@@ -88,6 +79,29 @@ impl Bench {
         bench.board.receive(&bench.host.next(&HELLO));
         bench.board.take_sent();
         bench
+    }
+
+    /// A board of a machine with this profile, at the home of the job, which is loaded.
+    pub(crate) fn loaded(prepared: &Prepared, profile: Profile) -> Self {
+        let start = prepared.header.axes.unwrap().home_nm.map(|nm| nm / STEP_NM);
+        Self::loaded_at(start, prepared, profile)
+    }
+
+    /// As [`Self::loaded`], with the carriages here.
+    pub(crate) fn loaded_at(start: [i32; 3], prepared: &Prepared, profile: Profile) -> Self {
+        let mut bench = Self::new(Box::new(Board::new()), start);
+        bench.ask(&Request::SetProfile(Some(profile)));
+        let home_nm = bench.home();
+        bench.load(prepared, home_nm);
+        bench
+    }
+
+    /// Stores the loaded job as "left", to begin anywhere.
+    pub(crate) fn store(&mut self) {
+        self.ask(&Request::StoreJob {
+            name: JobName::try_from("left").unwrap(),
+            begins_anywhere: true,
+        });
     }
 
     /// Cuts the power: pulses that are not emitted yet are lost.
@@ -305,13 +319,9 @@ fn a_run_is_complete_after_power_cuts_at_random_ticks() {
         let job = sample_job(name, pattern, overrun_mm, None);
         let prepared = prepare(&job).unwrap();
         let mark = job_mark(&prepared.header, job_digest(&prepared.words));
-        let start = prepared.header.axes.unwrap().home_nm.map(|nm| nm / STEP_NM);
         let begin = || {
-            let mut bench = Bench::new(Box::new(Board::new()), start);
-            bench.ask(&Request::SetProfile(Some(profile(&job))));
+            let mut bench = Bench::loaded(&prepared, profile(&job));
             assert_eq!(bench.journal(), None);
-            let home_nm = bench.home();
-            bench.load(&prepared, home_nm);
             bench.ask(&Request::Start);
             bench
         };
@@ -376,12 +386,9 @@ fn a_run_is_complete_after_power_cuts_at_random_ticks() {
 fn a_place_is_of_the_job_and_the_profile_that_ran() {
     let jobs = [Pattern::Zigzag, Pattern::Zig].map(|pattern| sample_job("torus", pattern, 0.0, None));
     let prepared = [&jobs[0], &jobs[1]].map(|job| prepare(job).unwrap());
-    let start = prepared[0].header.axes.unwrap().home_nm.map(|nm| nm / STEP_NM);
     let begin = || {
-        let mut bench = Bench::new(Box::new(Board::new()), start);
-        bench.ask(&Request::SetProfile(Some(profile(&jobs[0]))));
-        let home_nm = bench.home();
-        bench.load(&prepared[0], home_nm);
+        let mut bench = Bench::loaded(&prepared[0], profile(&jobs[0]));
+        let home_nm = bench.start.map(|steps| steps * STEP_NM);
         bench.ask(&Request::Start);
         while bench.trail.iter().filter(|sample| sample.pass == 1).count() < 500 {
             bench.tick();
@@ -420,15 +427,8 @@ fn a_place_is_of_the_job_and_the_profile_that_ran() {
 fn a_run_that_a_full_journal_cannot_note_is_not_resumed_at_an_earlier_ones_place() {
     let job = sample_job("torus", Pattern::Zigzag, 0.0, None);
     let prepared = prepare(&job).unwrap();
-    let start = prepared.header.axes.unwrap().home_nm.map(|nm| nm / STEP_NM);
-    let mut bench = Bench::new(Box::new(Board::new()), start);
-    bench.ask(&Request::SetProfile(Some(profile(&job))));
-    let home_nm = bench.home();
-    bench.load(&prepared, home_nm);
-    bench.ask(&Request::StoreJob {
-        name: JobName::try_from("left").unwrap(),
-        begins_anywhere: true,
-    });
+    let mut bench = Bench::loaded(&prepared, profile(&job));
+    bench.store();
     let until_pass = |bench: &mut Bench, pass| {
         bench.trail.clear();
         bench.ask(&Request::Start);

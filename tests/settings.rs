@@ -1,17 +1,20 @@
 //! The machine profile that a board keeps: through power cuts, and against jobs that exceed it.
 
 use controller::in_process::Board;
-use integration_tests::{HELLO, Host, dome, upload};
+use integration_tests::{HELLO, Host, LIMITS, PROFILE, dome, upload};
 use interp_core::{
     AxisLimits, Header,
     steps::{AxisSteps, StepConfig},
 };
 use protocol::message::{
-    Clock, Configuration, DoorContact, Excess, LinkTimeoutAction, Offsets, Profile, ProfileLimit, Reason,
-    Reply, Request, SpindleOrder, Status, StepSettings,
+    Clock, Configuration, Excess, LinkTimeoutAction, Offsets, Profile, ProfileLimit, Reason, Reply, Request,
+    SpindleOrder, Status, StepSettings,
 };
 
 const WORDS: usize = 64;
+
+const VELOCITY_MM_S: [f32; 3] = [100.0, 100.0, 50.0];
+const TRAVEL_NM: [[i32; 2]; 3] = [[-100_000_000, 100_000_000]; 3];
 
 const CONFIGURATION: Configuration = Configuration {
     homing_required: true,
@@ -32,17 +35,10 @@ fn profile() -> Profile {
     };
     Profile {
         steps: steps.into(),
-        velocity_mm_s: [100.0, 100.0, 50.0],
-        acceleration_mm_s2: [1000.0; 3],
-        jerk_mm_s3: [20_000.0; 3],
-        travel_nm: Some([[-100_000_000, 100_000_000]; 3]),
+        velocity_mm_s: VELOCITY_MM_S,
+        travel_nm: Some(TRAVEL_NM),
         configuration: CONFIGURATION,
-        homing: None,
-        probe_inverted: false,
-        step_inverted: 0,
-        enable_inverted: 0,
-        door: DoorContact::None,
-        spindle: None,
+        ..PROFILE
     }
 }
 
@@ -50,17 +46,9 @@ fn profile() -> Profile {
 fn limited() -> (Header, Vec<i32>) {
     let (mut header, words) = dome();
     header.axes = Some(AxisLimits {
-        velocity_mm_s: [100.0, 100.0, 50.0],
-        acceleration_mm_s2: [1000.0; 3],
-        jerk_mm_s3: [20_000.0; 3],
-        chord_mm: 0.005,
-        overrun_mm: 0.0,
-        travel_nm: [[-100_000_000, 100_000_000]; 3],
-        home_nm: [0, 0, 50_000_000],
-        plunge_mm: 2.0,
-        end_nm: None,
-        end_height_nm: 0,
-        safe_z_nm: 40_000_000,
+        velocity_mm_s: VELOCITY_MM_S,
+        travel_nm: TRAVEL_NM,
+        ..LIMITS
     });
     (header, words)
 }
@@ -80,6 +68,22 @@ impl Desk {
         desk.board.receive(&desk.host.next(&HELLO));
         desk.board.take_sent();
         desk
+    }
+
+    /// A new board with the profile, at home with a job that may start.
+    fn ready() -> Self {
+        let mut desk = Self::new(Board::new());
+        desk.ask(&Request::SetProfile(Some(profile()))).unwrap();
+        desk.load(limited()).unwrap();
+        desk.at_home();
+        desk
+    }
+
+    /// Switches the drives on, and declares the job's home.
+    fn at_home(&mut self) {
+        self.ask(&Request::Drives { on: true }).unwrap();
+        let home_nm = LIMITS.home_nm;
+        self.ask(&Request::SetHome { home_nm }).unwrap();
     }
 
     fn answer(&mut self, request: &Request) -> Reply {
@@ -195,9 +199,7 @@ fn no_job_exceeds_the_profile() {
     };
     assert_eq!(desk.load((fast, words)), Err(Reason::BeyondProfile { excess }));
     // The job before is still loaded.
-    desk.ask(&Request::Drives { on: true }).unwrap();
-    let home_nm = [0, 0, 50_000_000];
-    desk.ask(&Request::SetHome { home_nm }).unwrap();
+    desk.at_home();
     assert_eq!(desk.ask(&Request::Start), Ok(()));
     // Neither are settings changed under a run.
     let refused = desk.ask(&Request::SetProfile(None)).unwrap_err();
@@ -232,12 +234,7 @@ fn steps_and_homing_are_the_machines() {
 
 #[test]
 fn a_job_is_loaded_again_after_a_change_of_the_profile() {
-    let mut desk = Desk::new(Board::new());
-    desk.ask(&Request::SetProfile(Some(profile()))).unwrap();
-    desk.load(limited()).unwrap();
-    desk.ask(&Request::Drives { on: true }).unwrap();
-    let home_nm = [0, 0, 50_000_000];
-    desk.ask(&Request::SetHome { home_nm }).unwrap();
+    let mut desk = Desk::ready();
     let mut slow = profile();
     slow.velocity_mm_s = [10.0; 3];
     desk.ask(&Request::SetProfile(Some(slow))).unwrap();
@@ -268,12 +265,7 @@ fn nothing_that_a_start_was_checked_by_changes_before_its_period() {
             if clock == Clock::Lockstep && matches!(request, Request::Clock(_)) {
                 continue;
             }
-            let mut desk = Desk::new(Board::new());
-            desk.ask(&Request::SetProfile(Some(profile()))).unwrap();
-            desk.load(limited()).unwrap();
-            desk.ask(&Request::Drives { on: true }).unwrap();
-            let home_nm = [0, 0, 50_000_000];
-            desk.ask(&Request::SetHome { home_nm }).unwrap();
+            let mut desk = Desk::ready();
             desk.ask(&Request::Clock(clock)).unwrap();
             // On a free clock within the tick of the start.
             desk.board.receive(&desk.host.next(&Request::Start));

@@ -5,7 +5,7 @@ mod contact;
 
 use controller::in_process::Board;
 use controller::spindle::output;
-use integration_tests::{HELLO, Host, dome, upload};
+use integration_tests::{HELLO, Host, LIMITS, dome, upload};
 use interp_core::{AxisLimits, RunStart, SpanParameter, State};
 use protocol::message::{
     Activity, AtSpeed, Configuration, DoorContact, InputLines, LinkTimeoutAction, MotionStatus, PWM_STEPS,
@@ -54,7 +54,7 @@ impl Desk {
         desk.ask(&Request::SetProfile(Some(profile))).unwrap();
         desk.load();
         desk.ask(&Request::Drives { on: true }).unwrap();
-        let home_nm = [0, 0, 50_000_000];
+        let home_nm = LIMITS.home_nm;
         desk.ask(&Request::SetHome { home_nm }).unwrap();
         desk.ask(&Request::Spindle(ORDER)).unwrap();
         desk
@@ -66,18 +66,21 @@ impl Desk {
             velocity_mm_s: [100.0, 100.0, 50.0],
             acceleration_mm_s2: [1000.0, 1000.0, 500.0],
             jerk_mm_s3: [20_000.0, 20_000.0, 10_000.0],
-            chord_mm: 0.005,
-            overrun_mm: 0.0,
-            travel_nm: [[i32::MIN, i32::MAX]; 3],
-            home_nm: [0, 0, 50_000_000],
-            plunge_mm: 2.0,
-            end_nm: None,
-            end_height_nm: 0,
-            safe_z_nm: 40_000_000,
+            ..LIMITS
         });
         for request in upload(header, &words) {
             self.ask(&request).unwrap();
         }
+    }
+
+    /// A run is held after this many periods without a host.
+    fn hold_after(&mut self, link_timeout_ticks: u32) {
+        let hold = Configuration {
+            on_link_timeout: LinkTimeoutAction::Hold,
+            link_timeout_ticks,
+            ..Configuration::DEFAULT
+        };
+        self.ask(&Request::Configure(hold)).unwrap();
     }
 
     fn ticks(&mut self, ticks: u32) {
@@ -244,12 +247,7 @@ fn a_start_that_never_began_leaves_no_place_to_the_next() {
 #[test]
 fn a_run_held_because_the_host_is_gone_stands_without_it() {
     let mut desk = Desk::ready();
-    let hold = Configuration {
-        on_link_timeout: LinkTimeoutAction::Hold,
-        link_timeout_ticks: 1000,
-        ..Configuration::DEFAULT
-    };
-    desk.ask(&Request::Configure(hold)).unwrap();
+    desk.hold_after(1000);
     let mut desk = desk.running();
     desk.ticks(2500);
     assert_eq!(

@@ -1,6 +1,5 @@
 //! Jobs that a board keeps: stored, started by name or by the start button without a host, resumed after a power cut; under the conditions of any other start.
 
-use controller::in_process::Board;
 use interp_core::State;
 use job::Pattern;
 use machine::prepare::prepare;
@@ -20,16 +19,8 @@ fn name(text: &str) -> JobName {
 /// A homed board that keeps the torus as "left", and has been switched off since.
 fn bench() -> (Bench, job::Job) {
     let job = sample_job("torus", Pattern::Zigzag, 0.0, None);
-    let prepared = prepare(&job).unwrap();
-    let start = prepared.header.axes.unwrap().home_nm.map(|nm| nm / STEP_NM);
-    let mut bench = Bench::new(Box::new(Board::new()), start);
-    bench.ask(&Request::SetProfile(Some(profile(&job))));
-    let home_nm = bench.home();
-    bench.load(&prepared, home_nm);
-    bench.ask(&Request::StoreJob {
-        name: name("left"),
-        begins_anywhere: true,
-    });
+    let mut bench = Bench::loaded(&prepare(&job).unwrap(), profile(&job));
+    bench.store();
     (bench.cut(false), job)
 }
 
@@ -56,11 +47,7 @@ fn start(text: &str, resumes: bool) -> Request {
 
 /// The digest of a run of the job that a host gives the board, from where the axes stand.
 fn digest_of(job: &job::Job, start: [i32; 3]) -> u64 {
-    let prepared = prepare(job).unwrap();
-    let mut bench = Bench::new(Box::new(Board::new()), start);
-    bench.ask(&Request::SetProfile(Some(profile(job))));
-    let home_nm = bench.home();
-    bench.load(&prepared, home_nm);
+    let mut bench = Bench::loaded_at(start, &prepare(job).unwrap(), profile(job));
     bench.ask(&Request::Start);
     assert_eq!(bench.run(u32::MAX), State::Finished);
     bench.board.status().digest
@@ -130,11 +117,7 @@ fn a_stored_job_is_resumed_after_a_power_cut() {
         .unwrap();
     assert_eq!((first.pass, first.path), (journal.pass, journal.path));
     // Whole, beside the last moments before the cut.
-    let mut whole = Bench::new(Box::new(Board::new()), bench.start);
-    let prepared = prepare(&job).unwrap();
-    whole.ask(&Request::SetProfile(Some(profile(&job))));
-    let home_nm = whole.home();
-    whole.load(&prepared, home_nm);
+    let mut whole = Bench::loaded_at(bench.start, &prepare(&job).unwrap(), profile(&job));
     whole.ask(&Request::Start);
     assert_eq!(whole.run(u32::MAX), State::Finished);
     assert_eq!(whole.missing_in(&bench), 0);
@@ -226,9 +209,6 @@ fn a_stored_job_that_may_not_start_does_not_replace_the_loaded_one() {
 #[test]
 fn the_start_button_needs_no_host_while_the_spindle_comes_up_to_speed() {
     let job = sample_job("torus", Pattern::Zigzag, 0.0, None);
-    let prepared = prepare(&job).unwrap();
-    let start = prepared.header.axes.unwrap().home_nm.map(|nm| nm / STEP_NM);
-    let mut bench = Bench::new(Box::new(Board::new()), start);
     let mut profile = profile(&job);
     profile.configuration.on_link_timeout = LinkTimeoutAction::Hold;
     profile.configuration.link_timeout_ticks = 100;
@@ -238,18 +218,13 @@ fn the_start_button_needs_no_host_while_the_spindle_comes_up_to_speed() {
         stops_at_pause: true,
         at_speed: AtSpeed::ByTime,
     });
-    bench.ask(&Request::SetProfile(Some(profile)));
-    let home_nm = bench.home();
-    bench.load(&prepared, home_nm);
+    let mut bench = Bench::loaded(&prepare(&job).unwrap(), profile);
     bench.ask(&Request::Spindle(SpindleOrder {
         turning: Turning::Clockwise,
         rpm: 12_000,
         coolant: false,
     }));
-    bench.ask(&Request::StoreJob {
-        name: name("left"),
-        begins_anywhere: true,
-    });
+    bench.store();
     ticks(&mut bench, 100);
     press(&mut bench);
     ticks(&mut bench, 500);

@@ -95,7 +95,7 @@ impl<const WORDS: usize> Machine for Half<WORDS> {
         self.real_time.load_finish()
     }
 
-    fn profile(&mut self) -> Option<Profile> {
+    fn profile(&self) -> Option<&Profile> {
         self.settings.profile()
     }
 

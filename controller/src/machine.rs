@@ -135,7 +135,7 @@ pub trait Machine {
     fn load_finish(&mut self) -> Result<(), Fault>;
 
     /// The profile that the board keeps, if any.
-    fn profile(&mut self) -> Option<Profile>;
+    fn profile(&self) -> Option<&Profile>;
 
     /// Keeps a profile beyond a power cut; none: forgets it. Takes some milliseconds.
     ///

@@ -3,7 +3,7 @@
 use embedded_storage::nor_flash::NorFlash;
 use protocol::message::{Journal, OFFSETS_BYTES_MAX, Offsets, PROFILE_BYTES_MAX, Profile};
 
-use crate::storage::{Kind, Prepared, Storage, StorageError};
+use crate::storage::{Kind, PAYLOAD_MAX, Prepared, Storage, StorageError};
 
 /// The profile, and where it is kept.
 #[derive(Debug)]
@@ -17,12 +17,9 @@ impl<F: NorFlash> Settings<F> {
     /// Reads the profile; see [`Storage::open`] for the time that this takes.
     pub fn open(flash: F) -> Self {
         let mut storage = Storage::open(flash);
-        let profile = storage
-            .newest(Kind::Profile)
-            .and_then(|payload| Profile::read(payload.bytes()));
-        let offsets = storage
-            .newest(Kind::Offsets)
-            .and_then(|payload| Offsets::read(payload.bytes()));
+        let mut bytes = [0; PAYLOAD_MAX];
+        let profile = storage.newest(Kind::Profile, &mut bytes).and_then(Profile::read);
+        let offsets = storage.newest(Kind::Offsets, &mut bytes).and_then(Offsets::read);
         Self {
             storage,
             profile,
@@ -37,8 +34,8 @@ impl<F: NorFlash> Settings<F> {
 
     /// The profile, if one is kept.
     #[must_use]
-    pub const fn profile(&self) -> Option<Profile> {
-        self.profile
+    pub const fn profile(&self) -> Option<&Profile> {
+        self.profile.as_ref()
     }
 
     /// Work offsets and tool length.
@@ -72,8 +69,8 @@ impl<F: NorFlash> Settings<F> {
 
     /// How far the last run came; none where none was journalled.
     pub fn journal(&mut self) -> Option<Journal> {
-        let newest = self.storage.newest(Kind::Journal)?;
-        Journal::read(newest.bytes())
+        let mut bytes = [0; PAYLOAD_MAX];
+        Journal::read(self.storage.newest(Kind::Journal, &mut bytes)?)
     }
 
     /// Journals how far a run came.

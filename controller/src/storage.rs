@@ -21,6 +21,10 @@ use protocol::frame::crc32;
 /// Bytes of a slot: what a record of the journal takes, 3276 in a sector of 128 KB.
 pub const SLOT: usize = 40;
 
+/// Byte of the kind.
+const KIND: usize = 4;
+/// Byte of the payload's length.
+const LENGTH: usize = 5;
 /// Bytes before the payload.
 const HEAD: usize = 8;
 /// Bytes of the CRC.
@@ -69,21 +73,6 @@ impl Kind {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StorageError;
 
-/// The payload of the newest record of a kind.
-#[derive(Clone, Copy, Debug)]
-pub struct Payload {
-    bytes: [u8; PAYLOAD_MAX],
-    length: usize,
-}
-
-impl Payload {
-    /// Its bytes.
-    #[must_use]
-    pub fn bytes(&self) -> &[u8] {
-        self.bytes.get(..self.length).unwrap_or(&[])
-    }
-}
-
 /// A record of one slot that is not written yet, and where it will be.
 #[derive(Clone, Copy, Debug)]
 pub struct Prepared {
@@ -91,6 +80,15 @@ pub struct Prepared {
     pub offset: u32,
     /// All bytes of the slot.
     pub bytes: [u8; SLOT],
+}
+
+/// Where a record is.
+#[derive(Clone, Copy)]
+struct Place {
+    /// Offset of its first slot.
+    offset: u32,
+    /// Length of its payload.
+    length: u8,
 }
 
 /// A slot's content.
@@ -182,27 +180,36 @@ impl<F: NorFlash> Storage<F> {
             let newest = |storage: &mut Self, sector| storage.newest_in(sector, kind);
             let there = newest(self, 1 - self.active.sector);
             if let (None, Some(place)) = (newest(self, self.active.sector), there) {
-                let payload = self.payload(1 - self.active.sector, place).ok_or(StorageError)?;
-                self.append(kind, payload.bytes())?;
+                self.copy(place)?;
             }
         }
         Ok(())
     }
 
-    /// The payload of the newest record of a kind, if there is one.
-    pub fn newest(&mut self, kind: Kind) -> Option<Payload> {
-        let active = self.active.sector;
-        for sector in [active, 1 - active] {
-            if let Some(place) = self.newest_in(sector, kind) {
-                return self.payload(sector, place);
-            }
-        }
-        None
+    /// Copies a record of the other sector into the next slots. A function of its own, so that no search has its buffer on the stack.
+    #[inline(never)]
+    fn copy(&mut self, place: Place) -> Result<(), StorageError> {
+        let mut record = [BLANK; RECORD_MAX];
+        let bytes = slots_of(place.length.into()) * SLOT;
+        let record = record.get_mut(..bytes).ok_or(StorageError)?;
+        self.flash.read(place.offset, record).map_err(|_| StorageError)?;
+        self.write(record)
     }
 
-    /// Slot and length of the newest record of a kind in a sector.
+    /// The payload of the newest record of a kind, read into `bytes`. None where there is no record, or it is longer than `bytes`.
     #[inline(never)]
-    fn newest_in(&mut self, sector: u32, kind: Kind) -> Option<(u32, u8)> {
+    pub fn newest<'a>(&mut self, kind: Kind, bytes: &'a mut [u8]) -> Option<&'a [u8]> {
+        let active = self.active.sector;
+        let newest = self.newest_in(active, kind);
+        let place = newest.or_else(|| self.newest_in(1 - active, kind))?;
+        let payload = bytes.get_mut(..place.length.into())?;
+        self.flash.read(place.offset + HEAD as u32, payload).ok()?;
+        Some(payload)
+    }
+
+    /// The place of the newest record of a kind in a sector.
+    #[inline(never)]
+    fn newest_in(&mut self, sector: u32, kind: Kind) -> Option<Place> {
         let mut newest = None;
         let mut newest_sequence = 0;
         let (mut slot, mut blank) = (0, 0);
@@ -217,25 +224,12 @@ impl<F: NorFlash> Storage<F> {
                 && found == kind as u8
                 && sequence > newest_sequence
             {
-                (newest, newest_sequence) = (Some((slot, length)), sequence);
+                let offset = Self::offset(sector, slot);
+                (newest, newest_sequence) = (Some(Place { offset, length }), sequence);
             }
             slot += content.slots();
         }
         newest
-    }
-
-    /// The payload of a record.
-    #[inline(never)]
-    fn payload(&mut self, sector: u32, (slot, length): (u32, u8)) -> Option<Payload> {
-        let mut payload = Payload {
-            bytes: [0; PAYLOAD_MAX],
-            length: length.into(),
-        };
-        let place = payload.bytes.get_mut(..payload.length)?;
-        self.flash
-            .read(Self::offset(sector, slot) + HEAD as u32, place)
-            .ok()?;
-        Some(payload)
     }
 
     /// Keeps a record of a kind in place of the one before.
@@ -312,10 +306,12 @@ impl<F: NorFlash> Storage<F> {
             Some(beyond) if has_spare => (1 - sector, beyond),
             Some(_) => return None,
         };
-        let record = Record::new(sequence.checked_add(2)?, kind, payload)?;
+        let mut bytes = [BLANK; SLOT];
+        let record = lay_out(&mut bytes, kind, payload)?;
+        seal(record, sequence.checked_add(2)?);
         Some(Prepared {
             offset: Self::offset(sector, slot),
-            bytes: *record.bytes.first_chunk().filter(|_| record.slots == 1)?,
+            bytes,
         })
     }
 
@@ -335,30 +331,39 @@ impl<F: NorFlash> Storage<F> {
         }
     }
 
-    /// Writes a record into the next slots, and reads it back.
+    /// Writes a record of a kind into the next slots.
+    #[inline(never)]
     fn append(&mut self, kind: Kind, payload: &[u8]) -> Result<(), StorageError> {
+        let mut bytes = [BLANK; RECORD_MAX];
+        let record = lay_out(&mut bytes, kind, payload).ok_or(StorageError)?;
+        self.write(record)
+    }
+
+    /// Writes a record into the next slots with the next sequence number, and reads it back.
+    #[inline(never)]
+    fn write(&mut self, record: &mut [u8]) -> Result<(), StorageError> {
         let sequence = self.active.sequence.checked_add(1).ok_or(StorageError)?;
-        let record = Record::new(sequence, kind, payload).ok_or(StorageError)?;
-        if self.active.next + record.slots > Self::SLOTS {
+        seal(record, sequence);
+        let slots = (record.len() / SLOT) as u32;
+        if self.active.next + slots > Self::SLOTS {
             return Err(StorageError);
         }
         let offset = Self::offset(self.active.sector, self.active.next);
         // Whatever happens, the slots are not blank any more.
-        self.active.next += record.slots;
-        let bytes = record.bytes();
-        let (data, crc) = bytes.split_at(bytes.len() - CRC);
-        // To whole words, which a driver may write as such.
-        let written = data
-            .get(..(HEAD + payload.len()).next_multiple_of(CRC))
-            .unwrap_or(data);
+        self.active.next += slots;
+        let (data, crc) = record.split_last_chunk::<CRC>().ok_or(StorageError)?;
+        // To whole words, which a driver may write as such. The words behind the payload stay blank.
+        let length = data.get(LENGTH).copied().map_or(0, usize::from);
+        let written = data.get(..(HEAD + length).next_multiple_of(CRC)).unwrap_or(data);
         self.flash.write(offset, written).map_err(|_| StorageError)?;
         let last = offset + data.len() as u32;
         self.flash.write(last, crc).map_err(|_| StorageError)?;
-        let mut again = [0; RECORD_MAX];
-        let again = again.get_mut(..bytes.len()).ok_or(StorageError)?;
-        self.flash.read(offset, again).map_err(|_| StorageError)?;
-        if again != bytes {
-            return Err(StorageError);
+        for (at, slot) in (offset..).step_by(SLOT).zip(record.chunks_exact(SLOT)) {
+            let mut again = [0; SLOT];
+            self.flash.read(at, &mut again).map_err(|_| StorageError)?;
+            if again != *slot {
+                return Err(StorageError);
+            }
         }
         self.active.sequence = sequence;
         Ok(())
@@ -459,36 +464,24 @@ impl Content {
     }
 }
 
-/// A record's bytes.
-struct Record {
-    bytes: [u8; RECORD_MAX],
-    slots: u32,
+/// Lays a record out at the beginning of blank bytes, which [`seal`] completes. None where it is longer than they are.
+fn lay_out<'a>(bytes: &'a mut [u8], kind: Kind, payload: &[u8]) -> Option<&'a mut [u8]> {
+    let record = bytes.get_mut(..slots_of(payload.len()) * SLOT)?;
+    let length = u8::try_from(payload.len()).ok()?;
+    let fields = [kind as u8, length].into_iter().zip(KIND..);
+    for (byte, at) in fields.chain(payload.iter().copied().zip(HEAD..)) {
+        *record.get_mut(at)? = byte;
+    }
+    Some(record)
 }
 
-impl Record {
-    fn new(sequence: u32, kind: Kind, payload: &[u8]) -> Option<Self> {
-        let mut bytes = [BLANK; RECORD_MAX];
-        let length = u8::try_from(payload.len()).ok()?;
-        let slots = slots_of(payload.len());
-        let whole = bytes.get_mut(..slots * SLOT)?;
-        let (data, crc) = whole.split_at_mut(slots * SLOT - CRC);
-        let (head, place) = data.split_at_mut(HEAD);
-        place.get_mut(..payload.len())?.copy_from_slice(payload);
-        for (to, from) in head
-            .iter_mut()
-            .zip(sequence.to_le_bytes().into_iter().chain([kind as u8, length]))
-        {
-            *to = from;
-        }
-        crc.copy_from_slice(&crc32(data).to_le_bytes());
-        Some(Self {
-            bytes,
-            slots: slots as u32,
-        })
-    }
-
-    fn bytes(&self) -> &[u8] {
-        self.bytes.get(..self.slots as usize * SLOT).unwrap_or(&[])
+/// Gives a record its sequence number, and the CRC of all before.
+fn seal(record: &mut [u8], sequence: u32) {
+    if let Some((data, crc)) = record.split_last_chunk_mut::<CRC>()
+        && let Some(place) = data.first_chunk_mut()
+    {
+        *place = sequence.to_le_bytes();
+        *crc = crc32(data).to_le_bytes();
     }
 }
 

@@ -92,8 +92,19 @@ impl EventSource {
         self.entries.ready()
     }
 
+    /// Takes out all events, in order; whether there was one. A function of its own, so that no request has an event on the stack.
+    #[inline(never)]
+    pub(crate) fn drain(&mut self, mut take: impl FnMut(&Event)) -> bool {
+        let mut was_one = false;
+        while let Some(event) = self.dequeue() {
+            take(&event);
+            was_one = true;
+        }
+        was_one
+    }
+
     /// The next event, if there is one.
-    pub(crate) fn dequeue(&mut self) -> Option<Event> {
+    fn dequeue(&mut self) -> Option<Event> {
         Some(match self.entries.dequeue()? {
             Entry::Sample(sample) => Event::Sample(sample),
             Entry::Pass(pass) => Event::Pass(pass),

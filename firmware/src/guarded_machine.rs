@@ -97,7 +97,7 @@ impl<M: Mutex<T = BoardRealTime>, F: Mutex<T = BoardFalling>> Machine for Guarde
         self.real_time.lock(|real_time| real_time.load_finish())
     }
 
-    fn profile(&mut self) -> Option<Profile> {
+    fn profile(&self) -> Option<&Profile> {
         self.settings.profile()
     }
 

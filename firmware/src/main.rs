@@ -301,8 +301,7 @@ mod app {
         loop {
             let mut send = |bytes: &[u8]| transmitter.write(bytes);
             let now = uptime_periods();
-            while let Some(event) = events_out.dequeue() {
-                link.event(&event, &mut send);
+            if events_out.drain(|event| link.event(event, &mut send)) {
                 last_event = Some(now);
             }
             if let Some(byte) = bytes_out.dequeue() {

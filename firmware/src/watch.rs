@@ -23,7 +23,8 @@ impl Watch {
         now.wrapping_sub(self.looked) >= LOOK_PERIODS
     }
 
-    /// Reads the state, and logs changes.
+    /// Reads the state, and logs changes. A function of its own, so that no request has the status on the stack.
+    #[inline(never)]
     pub(crate) fn look(&mut self, now: u32, machine: &mut impl Machine, bytes_lost: u32) {
         self.looked = now;
         let status = machine.status();

@@ -49,8 +49,7 @@ pub enum FaultKind {
     LimitSwitch = 17,
     /// A drive reports a fault: the drives are off, the machine is not homed. Value: the drive faults asserted, as bits.
     DriveFault = 18,
-    /// Link timeout: no request of the host that the board answers for longer than configured. Value: the timeout in periods.
-    LinkTimeout = 19,
+    // 19 was that of a link timeout, which is no fault; no new kind takes it.
     /// A start while the machine is not homed. Value: 0.
     NotHomed = 20,
     /// An axis has more steps in a period than the step output can emit. Value: the commanded steps.
@@ -66,7 +65,7 @@ pub enum FaultKind {
 
 impl FaultKind {
     /// Every kind, in order of its code.
-    pub const ALL: [Self; 24] = [
+    pub const ALL: [Self; 23] = [
         Self::BallDoesNotFit,
         Self::DegenerateSurface,
         Self::ParameterBackwards,
@@ -85,7 +84,6 @@ impl FaultKind {
         Self::EmergencyStop,
         Self::LimitSwitch,
         Self::DriveFault,
-        Self::LinkTimeout,
         Self::NotHomed,
         Self::StepRate,
         Self::StepOutput,
@@ -127,7 +125,6 @@ impl FaultKind {
             Self::EmergencyStop => "emergency-stop",
             Self::LimitSwitch => "limit-switch",
             Self::DriveFault => "drive-fault",
-            Self::LinkTimeout => "host-gone",
             Self::NotHomed => "not-homed",
             Self::StepRate => "step-rate",
             Self::StepOutput => "step-output",

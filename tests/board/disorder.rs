@@ -1,12 +1,12 @@
 //! Random sequences of requests, noise and missed ticks, against the runs that the core alone makes.
 
-use integration_tests::{HELLO, dome, upload};
+use integration_tests::{HELLO, MAKE_READY, PROFILE, dome, upload};
 use interp_core::{
     fault::FaultKind,
     sample::{Sample, State},
 };
 use proptest::prelude::*;
-use protocol::message::{Clock, Reply, Report, Request, Status};
+use protocol::message::{Clock, Profile, Reply, Report, Request, Status};
 
 use super::{Desk, digest, reference, samples_of_dome};
 
@@ -15,6 +15,8 @@ use super::{Desk, digest, reference, samples_of_dome};
 enum Deed {
     Noise(Vec<u8>),
     Upload,
+    /// Drives on, and home declared.
+    Ready,
     Ask(Request),
     /// A request with a wrong sequence number.
     Stray(u16, Request),
@@ -42,10 +44,17 @@ fn any_deed() -> impl Strategy<Value = Deed> {
     ]);
     requests.extend([Request::Report(Report::Samples), Request::Report(Report::Digests)]);
     requests.extend([Request::Run { ticks: 40 }, Request::Run { ticks: 0 }]);
+    // After a change of the profile the job has to be loaded again, and home may be lost.
+    let fast = Profile {
+        velocity_mm_s: [200.0; 3],
+        ..PROFILE
+    };
+    requests.extend([None, Some(PROFILE), Some(fast)].map(Request::SetProfile));
     let request = prop::sample::select(requests);
     prop_oneof![
         2 => prop::collection::vec(any::<u8>(), 0..400).prop_map(Deed::Noise),
         2 => Just(Deed::Upload),
+        2 => Just(Deed::Ready),
         12 => request.clone().prop_map(Deed::Ask),
         2 => (any::<u16>(), request.clone()).prop_map(|(number, request)| Deed::Stray(number, request)),
         2 => (request, any::<usize>()).prop_map(|(request, bit)| Deed::Damage(request, bit)),
@@ -72,6 +81,11 @@ fn act(desk: &mut Desk, deed: Deed) {
         Deed::Upload => {
             let (header, words) = dome();
             for request in upload(header, &words) {
+                desk.ask(&request);
+            }
+        }
+        Deed::Ready => {
+            for request in MAKE_READY {
                 desk.ask(&request);
             }
         }

@@ -1,8 +1,8 @@
 //! The planning of a period, a task below the tick: what a late one does to a run, and that the run is the same whenever it is in time.
 
 use controller::in_process::Board;
-use integration_tests::{HELLO, dome, upload};
-use interp_core::{AxisLimits, Command, FaultKind, Interpolator, Pattern, State};
+use integration_tests::{HELLO, LIMITS, dome, upload};
+use interp_core::{Command, FaultKind, Interpolator, Pattern, State};
 use protocol::{
     digest::Digest,
     message::{Clock, Reply, Report, Request, Status},
@@ -18,19 +18,7 @@ fn limited() -> (interp_core::Header, Vec<i32>) {
     let (mut header, words) = dome();
     header.pattern = Pattern::Zigzag;
     header.feed_mm_s = 40.0;
-    header.axes = Some(AxisLimits {
-        velocity_mm_s: [100.0; 3],
-        acceleration_mm_s2: [1000.0; 3],
-        jerk_mm_s3: [20_000.0; 3],
-        chord_mm: 0.005,
-        overrun_mm: 0.0,
-        travel_nm: [[i32::MIN, i32::MAX]; 3],
-        home_nm: [0, 0, 50_000_000],
-        plunge_mm: 2.0,
-        end_nm: None,
-        end_height_nm: 0,
-        safe_z_nm: 40_000_000,
-    });
+    header.axes = Some(LIMITS);
     (header, words)
 }
 

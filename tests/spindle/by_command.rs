@@ -2,9 +2,7 @@
 
 use controller::spindle::output;
 use interp_core::State;
-use protocol::message::{
-    Configuration, InputLines, LinkTimeoutAction, PWM_STEPS, Reason, Request, SpindleOrder, Turning,
-};
+use protocol::message::{InputLines, PWM_STEPS, Reason, Request, SpindleOrder, Turning};
 
 use super::{AT_SPEED, Desk, MAX_RPM, ON, with_contact};
 
@@ -109,12 +107,7 @@ fn a_coolant_switched_while_a_start_waits_is_that_of_its_run() {
 #[test]
 fn a_spindle_by_command_does_not_shorten_the_link_timeout_of_the_run_after_it() {
     let mut desk = Desk::ready();
-    let hold = Configuration {
-        on_link_timeout: LinkTimeoutAction::Hold,
-        link_timeout_ticks: 3_000,
-        ..Configuration::DEFAULT
-    };
-    desk.ask(&Request::Configure(hold)).unwrap();
+    desk.hold_after(3_000);
     desk.ask(&Request::Spindle(SpindleOrder::OFF)).unwrap();
     desk.ask(&Request::Turn {
         turning: Turning::Clockwise,

@@ -14,7 +14,7 @@ use controller::{
     storage::StorageError,
 };
 use interp_core::{
-    RunStart, encode,
+    AxisLimits, RunStart, encode,
     fault::{Fault, FaultKind},
     job::{Header, stream::RecordCopy},
     steps::{CheckedSteps, StepConfig},
@@ -24,8 +24,8 @@ use protocol::{
     digest::job_digest,
     frame::{Decoder, FRAME_MAX, write_request},
     message::{
-        Description, InputLines, Journal, MotionStatus, NO_NUMBER, Offsets, Profile, Reason, Reply, Request,
-        SafetyStatus, Status, Words, next_number, read_reply,
+        Configuration, Description, DoorContact, InputLines, Journal, MotionStatus, NO_NUMBER, Offsets,
+        Profile, Reason, Reply, Request, SafetyStatus, Status, StepSettings, Words, next_number, read_reply,
     },
 };
 
@@ -71,6 +71,37 @@ pub const HELLO: Request = Request::Hello {
 
 /// The requests after which a board with no input asserted may start a run.
 pub const MAKE_READY: [Request; 2] = [Request::Drives { on: true }, Request::SetHome { home_nm: [0; 3] }];
+
+/// Axis limits, the same for all axes, without bounds of the travel; home and safe height are above the [`dome`].
+pub const LIMITS: AxisLimits = AxisLimits {
+    velocity_mm_s: [100.0; 3],
+    acceleration_mm_s2: [1000.0; 3],
+    jerk_mm_s3: [20_000.0; 3],
+    chord_mm: 0.005,
+    overrun_mm: 0.0,
+    travel_nm: [[i32::MIN, i32::MAX]; 3],
+    home_nm: [0, 0, 50_000_000],
+    plunge_mm: 2.0,
+    end_nm: None,
+    end_height_nm: 0,
+    safe_z_nm: 40_000_000,
+};
+
+/// A profile with the limits of [`LIMITS`]: of a machine without switches, door contact and spindle.
+pub const PROFILE: Profile = Profile {
+    steps: StepSettings::DEFAULT,
+    velocity_mm_s: LIMITS.velocity_mm_s,
+    acceleration_mm_s2: LIMITS.acceleration_mm_s2,
+    jerk_mm_s3: LIMITS.jerk_mm_s3,
+    travel_nm: None,
+    configuration: Configuration::DEFAULT,
+    homing: None,
+    probe_inverted: false,
+    step_inverted: 0,
+    enable_inverted: 0,
+    door: DoorContact::None,
+    spindle: None,
+};
 
 /// The safety status after [`MAKE_READY`].
 pub const SAFE: SafetyStatus = SafetyStatus {
@@ -243,8 +274,8 @@ impl Machine for Mock {
         Ok(())
     }
 
-    fn profile(&mut self) -> Option<Profile> {
-        self.profile
+    fn profile(&self) -> Option<&Profile> {
+        self.profile.as_ref()
     }
 
     fn keep_profile(&mut self, profile: Option<&Profile>) -> Result<(), StorageError> {

@@ -154,7 +154,9 @@ impl Session {
     /// Begins to load a stored job, if it may start. Returns its spindle.
     #[inline(never)]
     fn begin_stored(&mut self, machine: &mut impl Machine, place: &JobPlace) -> Result<SpindleOrder, Reason> {
-        let mut job = machine.jobs().job(place).ok_or(Reason::NoStoredJob)?;
+        let mut found = machine.jobs().job(place);
+        // Not moved out of the option: that would be a second copy on the stack.
+        let job = found.as_mut().ok_or(Reason::NoStoredJob)?;
         if let Some(axes) = &mut job.header.axes
             && job.begins_anywhere
         {
@@ -220,8 +222,8 @@ impl Session {
 /// The mark of a stored job.
 #[inline(never)]
 fn mark_of(machine: &mut impl Machine, place: &JobPlace) -> Option<u64> {
-    let job = machine.jobs().job(place)?;
-    Some(job_mark(&job.header, job.digest))
+    let found = machine.jobs().job(place);
+    found.as_ref().map(|job| job_mark(&job.header, job.digest))
 }
 
 /// Goes through the words of the loaded job.

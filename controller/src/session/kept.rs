@@ -68,37 +68,25 @@ impl Session {
 
 /// Puts the supervision of the kept profile in force; returns the profile's digest, 0 where there is none.
 fn supervise(machine: &mut impl Machine) -> Result<u32, Reason> {
-    let (configuration, digest) = supervision(machine);
+    let (configuration, digest) = match machine.profile() {
+        Some(profile) => (profile.configuration, profile.digest()),
+        None => (Configuration::DEFAULT, 0),
+    };
     machine.order(Order::Configure(configuration))?;
     Ok(digest)
 }
 
-/// The supervision of the kept profile, and the profile's digest. A function of its own, because a profile on the stack is 200 bytes.
-#[inline(never)]
-fn supervision(machine: &mut impl Machine) -> (Configuration, u32) {
-    match machine.profile() {
-        Some(profile) => (profile.configuration, profile.digest()),
-        None => (Configuration::DEFAULT, 0),
-    }
-}
-
 /// Whether the machine has a spindle that the board switches.
-#[inline(never)]
-pub(super) fn has_spindle(machine: &mut impl Machine) -> bool {
+pub(super) fn has_spindle(machine: &impl Machine) -> bool {
     machine.profile().is_some_and(|profile| profile.spindle.is_some())
 }
 
 /// Puts the kept profile's part for motion outside a job in force.
-fn set_up(machine: &mut impl Machine) -> Result<(), Reason> {
-    let setup = setup_of(machine);
-    machine.order(Order::SetUp(setup))
-}
-
 #[inline(never)]
-fn setup_of(machine: &mut impl Machine) -> Option<Setup> {
+fn set_up(machine: &mut impl Machine) -> Result<(), Reason> {
     let period_s = period_s(machine);
-    let profile = machine.profile()?;
-    Some(Setup::new(&profile, period_s))
+    let setup = machine.profile().map(|profile| Setup::new(profile, period_s));
+    machine.order(Order::SetUp(setup))
 }
 
 /// Length of a period, s.
@@ -123,7 +111,7 @@ pub(super) const fn beyond(excess: Excess) -> Reason {
 }
 
 /// Whether these settings differ from the profile's, if the board keeps one.
-pub(super) fn has_other_steps(machine: &mut impl Machine, settings: StepSettings) -> bool {
+pub(super) fn has_other_steps(machine: &impl Machine, settings: StepSettings) -> bool {
     machine.profile().is_some_and(|profile| profile.steps != settings)
 }
 

@@ -35,7 +35,7 @@ impl Session {
             },
             Request::Profile => Reply::Profile {
                 number,
-                profile: machine.profile(),
+                profile: machine.profile().copied(),
             },
             Request::Motion => Reply::Motion {
                 number,
@@ -162,8 +162,7 @@ impl Session {
         if self.command_waits(machine) {
             return Err(Reason::Busy);
         }
-        let profile = machine.profile();
-        if let (Some(profile), Some(axes)) = (profile, &header.axes)
+        if let (Some(profile), Some(axes)) = (machine.profile(), &header.axes)
             && let Some(excess) = profile.exceeded_by(axes)
         {
             return Err(beyond(excess));

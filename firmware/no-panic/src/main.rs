@@ -169,7 +169,9 @@ mod app {
         loop {
             let command = black_box(Instruction::Run { ticks: 0 });
             let _ = context.local.commands_in.enqueue(command);
-            black_box(context.local.events_out.dequeue());
+            let _ = context.local.events_out.drain(|event| {
+                black_box(event);
+            });
             context.shared.real_time.lock(|real_time| {
                 black_box(real_time);
             });

@@ -162,13 +162,6 @@ fn words(kind: FaultKind) -> [&'static str; 5] {
             "Find the cause at the drive. Then `cargo sim operate --port DEV acknowledge`, `on`, and `home`; a machine without switches: place the axes, and `home X,Y,Z`.",
             "A servo drive whose following error is too large.",
         ],
-        FaultKind::LinkTimeout => [
-            "The host was silent in a run for longer than it had said. The run went on to its end, or was held along its path, as `machine.host_gone` says.",
-            "The time in periods.",
-            "The cable came off, or the host's computer sleeps, has stopped, or is busy.",
-            "Connect again: `cargo sim operate --port DEV attach` says where the run is and follows it; `resume` goes on exactly there, `stop` gives it up.",
-            "The USB cable pulled out while a job with `host_gone = \"hold\"` runs.",
-        ],
         FaultKind::NotHomed => [
             "The machine is not homed: the position of its axes is unknown, so no run starts.",
             "0.",

@@ -187,10 +187,6 @@ pub fn fault(fault: Fault) -> (String, &'static str) {
             ),
             "find the cause at the drive; then `operate acknowledge`, `on`, and `home`",
         ),
-        FaultKind::LinkTimeout => (
-            format!("no word of the host for {value} periods"),
-            "connect again with `cargo sim operate --port DEV attach`, and resume or stop the run",
-        ),
         FaultKind::NotHomed => (
             "the machine is not homed: the position of its axes has not been declared".to_owned(),
             "home it by its switches: `operate on`, `operate home`; or position the axes by hand and declare where they stand: `operate home X,Y,Z`. On a bench without axes: homing_required = false in [machine]",

@@ -533,7 +533,7 @@ fn print_line(run: &BoardRun) {
         );
     }
     if run.status.safety.link_timed_out {
-        say!("  host         heartbeat timeout during the run: see cargo sim explain host-gone");
+        say!("  host         heartbeat timeout during the run: see docs/operating.md, When the host is gone");
     }
     match (run.commanded, run.first_difference) {
         (true, _) => say!("  compared     nothing: the run had operator commands or a feed override"),
