@@ -137,19 +137,30 @@ fn follow(
     })
 }
 
-/// Measures a job of constant scallop height beside straight passes; `None` for other jobs.
+/// Measures a job of constant scallop height beside straight passes; `None` for other jobs. `straight`: the job with these, where it is prepared already, with the words of
+/// its links.
 ///
 /// # Errors
 /// As [`path_figures`], of the job itself.
-pub fn curved_figures(job: &Job, prepared: &Prepared) -> Result<Option<CurvedFigures>, InspectError> {
+pub fn curved_figures(
+    job: &Job,
+    prepared: &Prepared,
+    straight: Option<(&Job, &Prepared)>,
+) -> Result<Option<CurvedFigures>, InspectError> {
     if !job.spacing.is_constant() {
         return Ok(None);
     }
     let own = path_figures(job, prepared)?;
-    let mut other = job.clone();
-    other.spacing = Spacing::Exact;
-    let straight = prepare(&other)
-        .ok()
-        .and_then(|prepared| path_figures(&other, &prepared).ok());
+    let straight = match straight {
+        Some((job, prepared)) => path_figures(job, prepared).ok(),
+        None => {
+            let job = Job {
+                spacing: Spacing::Exact,
+                ..job.clone()
+            };
+            let prepared = prepare(&job).ok();
+            prepared.and_then(|prepared| path_figures(&job, &prepared).ok())
+        }
+    };
     Ok(Some(CurvedFigures { own, straight }))
 }

@@ -156,6 +156,9 @@ pub struct Requirements<'a> {
     pub with_optimum: bool,
     /// Requirements of the swept ball.
     pub swept: swept::Requirements<'a>,
+    /// The same job with straight passes, beside which those of constant scallop height are measured; without it such a job is compared with its own, without the words of
+    /// its links.
+    pub straight: Option<(&'a Job, &'a Prepared)>,
 }
 
 /// Verifies a job after its timed run. `each` is called for every sample on a pass.
@@ -171,7 +174,7 @@ pub fn verify_run(
     progress: &dyn Progress,
 ) -> Result<Verification, InspectError> {
     let mut measured = measure(job, prepared, timed, each, requirements, progress)?;
-    let without_curved = match curved_figures(job, prepared) {
+    let without_curved = match curved_figures(job, prepared, requirements.straight) {
         Ok(curved) => {
             measured.curved = curved;
             None

@@ -8,7 +8,7 @@ use job::Job;
 use job::units::S_PER_MIN;
 use machine::prepare::Prepared;
 use verify::motion::limits::{ORDERS, Peak, Peaks};
-use verify::swept::{ConcaveRadius, SweptResult};
+use verify::swept::{ConcaveRadius, MISSED_RADII, SweptResult};
 use verify::{Verdict, survey};
 
 /// Capacity of the board for surface data, bytes.
@@ -54,6 +54,12 @@ pub(super) fn json(
         },
         "scallop_at": null_unless(measured, json!({ "u": most.u, "v": most.v, "gap": most.passes[0], "passes": most.passes, "place_mm": most.point_mm.to_array() })),
         "scallop_area_by_tenth": found.scallop_histogram,
+        "region_heights": found.region.map(|region| json!({
+            "area_mm2": region.area_mm2, "served_share": region.served_share, "ridges_share": region.ridges_share, "places": region.places,
+            "highest_mm": region.highest.height_mm,
+            "highest_at": { "u": region.highest.uv[0], "v": region.highest.uv[1], "place_mm": region.highest.point_mm.to_array() },
+            "highest_beside_mm": region.highest_beside.height_mm, "above_beside_share": region.above_share,
+        })),
         "gouge_max_mm": null_unless(found.gouge_verdict != Verdict::Unknown, json!(found.gouge_max_mm())),
         "gouge_floor_mm": found.gouge_floor_mm,
         "gouge_bound_mm": found.gouge_bound_mm,
@@ -237,6 +243,7 @@ fn scallop(job: &Job, found: &SweptResult) {
             mark(Verdict::Unknown),
             "scallop height"
         );
+        region(job, found);
         return;
     }
     let (most, error) = (&found.scallop_max, &found.measurement_error);
@@ -268,13 +275,45 @@ fn scallop(job: &Job, found: &SweptResult) {
         um(error.search_mm)
     );
     row("", &parts);
+    if job.region.is_none() {
+        row("", "first and last pass lie on the boundaries: no uncut margin");
+    }
+    region(job, found);
+}
+
+/// Heights in a drawn region, place by place.
+fn region(job: &Job, found: &SweptResult) {
+    let Some(region) = &found.region else {
+        return;
+    };
+    let height = |mm: f64| {
+        if mm >= MISSED_RADII * job.radius_mm {
+            "uncut".to_owned()
+        } else {
+            format!("{:.4} um", um(mm))
+        }
+    };
+    let percent = |share: f64| 100.0 * share;
+    row(
+        "region",
+        &format!(
+            "{:.1} % of its {:.1} mm2 are half a step-over or more from its boundary: highest {} at u = {:.6}, v = {:.6}; ridges with the +- above are in {:.1} %",
+            percent(region.served_share),
+            region.area_mm2,
+            height(region.highest.height_mm),
+            region.highest.uv[0],
+            region.highest.uv[1],
+            percent(region.ridges_share)
+        ),
+    );
     row(
         "",
-        if job.region.is_some() {
-            "between passes of neighbouring lines; half a step-over from the region's boundary is left out"
-        } else {
-            "first and last pass lie on the boundaries: no uncut margin"
-        },
+        &format!(
+            "nearer to the boundary {:.1} % of the region are above the limit, up to {}; {} places",
+            percent(region.above_share),
+            height(region.highest_beside.height_mm),
+            region.places
+        ),
     );
 }
 

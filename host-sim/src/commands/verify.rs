@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use inspect::{BOUNDS, Requirements, RunMeasurements, TimedRun, Verification, verify_run};
-use job::Job;
 use job::units::S_PER_MIN;
+use job::{Job, Spacing};
 use machine::prepare::Prepared;
 use oracle::{AccuracyFigure, PassSample, SampleCheck};
 use part::{PartCheck, PassCentres};
@@ -20,7 +20,7 @@ use super::out::{complain, say};
 use super::simulate::{WantedReport, remarks, report, timed};
 use super::{
     Bar, Failure, Result, along, error_json, home, motion_words, numbers, part_words, reach_words,
-    read_profile, swept_words,
+    read_profile, settled, swept_words,
 };
 
 /// Checks a job before it runs on a machine. Every sample against an independent f64 oracle: positions, normals, feed ripple, path
@@ -348,6 +348,17 @@ fn load(arguments: &Arguments, path: &Path) -> Result<(Job, Prepared)> {
     home::load(path, profile.as_ref(), arguments.placed.origin, None)
 }
 
+/// The job of passes of constant scallop height with straight ones, as it would be run.
+fn straight(job: &Job, stop: Stop) -> Option<(Job, Prepared)> {
+    let job = Job {
+        spacing: Spacing::Exact,
+        ..job.clone()
+    };
+    let (mut job, mut prepared) = settled(job).ok()?;
+    stop.apply(&mut job, &mut prepared);
+    Some((job, prepared))
+}
+
 /// Verifies one job and prints its figures unless JSON is requested. Returns whether it passed, and its JSON object.
 fn verify_job(
     arguments: &Arguments,
@@ -360,6 +371,9 @@ fn verify_job(
     let directory = WantedReport::new(directory, arguments.force)?;
     let timed = timed(&job, &prepared)?;
     let original = original(&job)?;
+    let straight = (job.spacing.is_constant())
+        .then(|| straight(&job, stop))
+        .flatten();
     let requirements = Requirements {
         with_optimum: arguments.optimum || job.machine.has_limits(),
         swept: swept::Requirements {
@@ -371,6 +385,7 @@ fn verify_job(
                     tolerance_mm: *tolerance_mm,
                 }),
         },
+        straight: straight.as_ref().map(|(job, prepared)| (job, prepared)),
     };
     let mut sketch = directory.map(|_| Sketch::new(&job, timed.passes.len()));
     let mut centres = job.origin.reach().map(|_| PassCentres::default());

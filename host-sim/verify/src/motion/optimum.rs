@@ -36,6 +36,8 @@ const RAMP: f64 = 40.0;
 const GROWTH: f64 = 0.15;
 /// Change of speed over an interval, as a share of the largest, once a motion is known.
 const CHANGE: f64 = 0.04;
+/// Largest slope of the speed at a node in those of the intervals beside it.
+const SLOPES: f64 = 3.0;
 /// Least squared speed used for linearisation, as a share of the largest.
 const LEAST: f64 = 1e-9;
 /// Steps of a derivative below this share of a jerk limit are ignored.
@@ -336,9 +338,16 @@ impl<'a> MotionSearch<'a> {
                 .partition_point(|at| *at <= arc)
                 .clamp(1, grid.intervals.len())
                 - 1;
-            // dv/ds = a / v
+            // dv/ds = a / v; with limits far above those that bind, accelerations of a solution alternate, and the speeds do not follow.
+            let change = (k.saturating_sub(1)..=(k + 1).min(grid.intervals.len() - 1))
+                .map(|near| {
+                    let [before, after] = [near, near + 1].map(|node| profile.squares[node].sqrt());
+                    (after - before).abs() / grid.intervals[near].length
+                })
+                .fold(0.0, f64::max);
             for node in [k, k + 1] {
-                let slope = profile.accelerations[node].abs() / profile.squares[node].sqrt();
+                let of_node = profile.accelerations[node].abs() / profile.squares[node].sqrt();
+                let slope = of_node.min(SLOPES * change);
                 let largest = self.speed_max_mm_s;
                 let floor = self.path.length_mm() * 1e-4;
                 if slope > 0.0 {

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use super::Progress;
 use super::grid::CellGrid;
 use super::height::Ray;
+use super::ridge::MISSED_RADII;
 use super::track::ToolPath;
 use super::tree::PathTree;
 use glam::DVec3;
@@ -19,8 +20,6 @@ use oracle::Oracle;
 const STARTS: usize = 64;
 /// Bisections of the step of such a search.
 const HALVINGS: usize = 40;
-/// Height of a point that no ball reaches, in radii.
-const MISSED_RADII: f64 = 4.0;
 
 /// A place of the field.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -31,6 +30,17 @@ pub struct FieldPoint {
     pub uv: [f64; 2],
     /// Point on the surface, mm.
     pub point_mm: DVec3,
+}
+
+impl FieldPoint {
+    /// The higher of two places.
+    pub(super) fn higher(self, other: Self) -> Self {
+        if other.height_mm > self.height_mm {
+            other
+        } else {
+            self
+        }
+    }
 }
 
 /// Heights over the surface.
@@ -61,23 +71,7 @@ pub fn height_field(
     let tree = PathTree::new(path, oracle.radius_mm);
     let grid = CellGrid::new(oracle);
     let missed = MISSED_RADII * oracle.radius_mm;
-    let at = |[u, v]: [f64; 2]| -> Option<(FieldPoint, f64)> {
-        // Beside a region's boundary the last ball stands at the end of a pass.
-        if !oracle.is_served(u, v) {
-            return None;
-        }
-        let at = oracle.surface.at(u, v);
-        let ray = Ray {
-            from: at.point,
-            along: oracle.normal(&at, u, v).ok()?,
-        };
-        let place = FieldPoint {
-            height_mm: tree.entry(&ray, missed),
-            uv: [u, v],
-            point_mm: at.point,
-        };
-        Some((place, at.u.cross(at.v).length()))
-    };
+    let heights = Heights { oracle, tree: &tree };
     progress.begin("heights", grid.count() as u64);
     let places: Vec<(FieldPoint, f64)> = (0..grid.count())
         .into_par_iter()
@@ -85,7 +79,7 @@ pub fn height_field(
             progress.done(1);
             let cell = grid.cell(index);
             let (u, v) = cell.middle();
-            let (place, area) = at([u, v])?;
+            let (place, area) = heights.served([u, v])?;
             Some((place, area * (cell.u[1] - cell.u[0]) * (cell.v[1] - cell.v[0])))
         })
         .collect();
@@ -103,13 +97,53 @@ pub fn height_field(
         let edges = &grid.edges[axis];
         edges.windows(2).map(|ends| ends[1] - ends[0]).fold(0.0, f64::max)
     });
-    let extreme = |sign: f64| {
-        let mut order: Vec<FieldPoint> = places.iter().map(|(place, _)| *place).collect();
-        order.sort_by(|a, b| (sign * b.height_mm).total_cmp(&(sign * a.height_mm)));
-        let searched = order
+    let starts = || places.iter().map(|(place, _)| *place).collect();
+    let field = HeightField {
+        highest: heights.extreme(starts(), 1.0, [du, dv]),
+        lowest: heights.extreme(starts(), -1.0, [du, dv]),
+        mean_mm: if area > 0.0 { sum / area } else { 0.0 },
+        uncut_share: if area > 0.0 { uncut.abs() / area } else { 0.0 },
+        points: places.len(),
+    };
+    (field, heights.thinned(&grid))
+}
+
+/// Evaluates heights.
+#[derive(Clone, Copy)]
+pub(super) struct Heights<'a> {
+    pub(super) oracle: &'a Oracle,
+    pub(super) tree: &'a PathTree<'a>,
+}
+
+impl Heights<'_> {
+    /// The height at a place, and |S_u x S_v| there; `None` where the surface has no normal.
+    pub(super) fn at(&self, [u, v]: [f64; 2]) -> Option<(FieldPoint, f64)> {
+        let at = self.oracle.surface.at(u, v);
+        let ray = Ray {
+            from: at.point,
+            along: self.oracle.normal(&at, u, v).ok()?,
+        };
+        let place = FieldPoint {
+            height_mm: self.tree.entry(&ray, MISSED_RADII * self.oracle.radius_mm),
+            uv: [u, v],
+            point_mm: at.point,
+        };
+        Some((place, at.u.cross(at.v).length()))
+    }
+
+    /// The same where passes serve the place: beside a region's boundary the last ball stands at the end of a pass.
+    pub(super) fn served(&self, uv: [f64; 2]) -> Option<(FieldPoint, f64)> {
+        let [u, v] = uv;
+        self.oracle.is_served(u, v).then(|| self.at(uv)).flatten()
+    }
+
+    /// The highest place (`sign` 1), or the lowest (-1), from the best of these; `steps`: first steps of the search in u and v.
+    pub(super) fn extreme(&self, mut starts: Vec<FieldPoint>, sign: f64, steps: [f64; 2]) -> FieldPoint {
+        starts.sort_by(|a, b| (sign * b.height_mm).total_cmp(&(sign * a.height_mm)));
+        let searched = starts
             .par_iter()
             .take(STARTS)
-            .map(|start| climb(oracle, &at, *start, sign, [du, dv]));
+            .map(|start| self.climb(*start, sign, steps));
         let best = |a: FieldPoint, b: FieldPoint| {
             if sign * b.height_mm > sign * a.height_mm {
                 b
@@ -118,85 +152,67 @@ pub fn height_field(
             }
         };
         searched.reduce_with(best).unwrap_or_default()
-    };
-    let field = HeightField {
-        highest: extreme(1.0),
-        lowest: extreme(-1.0),
-        mean_mm: if area > 0.0 { sum / area } else { 0.0 },
-        uncut_share: if area > 0.0 { uncut.abs() / area } else { 0.0 },
-        points: places.len(),
-    };
-    (field, thinned(oracle, &grid, &at))
-}
+    }
 
-/// Lines of the field along the path parameter, through the middles of evenly spread cells.
-fn thinned(
-    oracle: &Oracle,
-    grid: &CellGrid,
-    at: &(dyn Fn([f64; 2]) -> Option<(FieldPoint, f64)> + Sync),
-) -> Vec<Vec<FieldPoint>> {
-    let [rows, columns] = grid.shape();
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_precision_loss,
-        clippy::cast_sign_loss,
-        reason = "small and positive"
-    )]
-    let step = ((rows * columns) as f64 / THINNED_MAX as f64)
-        .sqrt()
-        .ceil()
-        .max(1.0) as usize;
-    let middles = |axis: usize| -> Vec<f64> {
-        let edges = grid.edges[axis].windows(2).step_by(step);
-        edges.map(|ends| 0.5 * (ends[0] + ends[1])).collect()
-    };
-    let (along_path, beside) = match oracle.along {
-        Along::U => (middles(0), middles(1)),
-        Along::V => (middles(1), middles(0)),
-    };
-    let place = |path: f64, side: f64| {
-        let (u, v) = oracle.swapped(path, side);
-        at([u, v]).map(|(place, _)| place)
-    };
-    beside
-        .par_iter()
-        .map(|side| along_path.iter().filter_map(|path| place(*path, *side)).collect())
-        .collect()
-}
+    /// Lines of the field along the path parameter, through the middles of evenly spread cells.
+    fn thinned(&self, grid: &CellGrid) -> Vec<Vec<FieldPoint>> {
+        let [rows, columns] = grid.shape();
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_precision_loss,
+            clippy::cast_sign_loss,
+            reason = "small and positive"
+        )]
+        let step = ((rows * columns) as f64 / THINNED_MAX as f64)
+            .sqrt()
+            .ceil()
+            .max(1.0) as usize;
+        let middles = |axis: usize| -> Vec<f64> {
+            let edges = grid.edges[axis].windows(2).step_by(step);
+            edges.map(|ends| 0.5 * (ends[0] + ends[1])).collect()
+        };
+        let (along_path, beside) = match self.oracle.along {
+            Along::U => (middles(0), middles(1)),
+            Along::V => (middles(1), middles(0)),
+        };
+        let place = |path: f64, side: f64| {
+            let (u, v) = self.oracle.swapped(path, side);
+            self.served([u, v]).map(|(place, _)| place)
+        };
+        beside
+            .par_iter()
+            .map(|side| along_path.iter().filter_map(|path| place(*path, *side)).collect())
+            .collect()
+    }
 
-/// Pattern search from a place with bisected steps, within the surface.
-fn climb(
-    oracle: &Oracle,
-    at: &(dyn Fn([f64; 2]) -> Option<(FieldPoint, f64)> + Sync),
-    start: FieldPoint,
-    sign: f64,
-    [mut du, mut dv]: [f64; 2],
-) -> FieldPoint {
-    let [[u0, u1], [v0, v1]] = oracle.surface.domain();
-    let mut best = start;
-    for _ in 0..HALVINGS {
-        let mut moved = false;
-        for (i, j) in [
-            (1, 0),
-            (-1, 0),
-            (0, 1),
-            (0, -1),
-            (1, 1),
-            (1, -1),
-            (-1, 1),
-            (-1, -1),
-        ] {
-            let u = (best.uv[0] + f64::from(i) * du).clamp(u0, u1);
-            let v = (best.uv[1] + f64::from(j) * dv).clamp(v0, v1);
-            if let Some((place, _)) = at([u, v])
-                && sign * place.height_mm > sign * best.height_mm
-            {
-                (best, moved) = (place, true);
+    /// Pattern search from a place with bisected steps, within the surface.
+    fn climb(&self, start: FieldPoint, sign: f64, [mut du, mut dv]: [f64; 2]) -> FieldPoint {
+        let [[u0, u1], [v0, v1]] = self.oracle.surface.domain();
+        let mut best = start;
+        for _ in 0..HALVINGS {
+            let mut moved = false;
+            for (i, j) in [
+                (1, 0),
+                (-1, 0),
+                (0, 1),
+                (0, -1),
+                (1, 1),
+                (1, -1),
+                (-1, 1),
+                (-1, -1),
+            ] {
+                let u = (best.uv[0] + f64::from(i) * du).clamp(u0, u1);
+                let v = (best.uv[1] + f64::from(j) * dv).clamp(v0, v1);
+                if let Some((place, _)) = self.served([u, v])
+                    && sign * place.height_mm > sign * best.height_mm
+                {
+                    (best, moved) = (place, true);
+                }
+            }
+            if !moved {
+                (du, dv) = (0.5 * du, 0.5 * dv);
             }
         }
-        if !moved {
-            (du, dv) = (0.5 * du, 0.5 * dv);
-        }
+        best
     }
-    best
 }

@@ -4,6 +4,7 @@ use super::Requirements;
 use super::axes::AxisTravel;
 use super::gouge::GougeSearchResult;
 use super::original::OriginalDeviation;
+use super::region::RegionHeights;
 use super::ridge::{Crest, Gap, GapRidge, MISSED_RADII};
 use super::shape::{ConcaveRadius, SurfaceCheck};
 use super::track::ToolPath;
@@ -23,7 +24,7 @@ const ROUNDING_MM: f64 = 0.866_025_403_784_438_6e-6;
 /// Tolerance of the search for a crest, mm: the two heights agree within it.
 const CREST_MM: f64 = 1e-8;
 /// A new limit is proposed with this margin: heights are proportional to the limit where the step-over is small.
-const ASKED_SHARE: f64 = 0.995;
+pub(super) const ASKED_SHARE: f64 = 0.995;
 /// A tolerance is proposed with this margin, as a share.
 const ACCEPTED_MARGIN: f64 = 1e-4;
 /// Every gouge deeper than this must be seen, mm, or than [`super::ERROR_SHARE_MAX`] of the scallop limit if that is more: ten times the
@@ -121,7 +122,7 @@ pub struct Ridge {
 pub struct SweptResult {
     /// The highest ridge. Zero with fewer than two complete passes: `ridges` is empty then.
     pub scallop_max: HighestScallop,
-    /// Verdict on the highest ridge. [`Verdict::Unknown`]: the error bound is above [`super::ERROR_SHARE_MAX`] of the limit, or there are
+    /// Verdict on the highest ridge, and on a region's places. [`Verdict::Unknown`]: the error bound is above [`super::ERROR_SHARE_MAX`] of the limit, or there are
     /// fewer than two whole passes.
     pub scallop_verdict: Verdict,
     /// Verdict on gouges: deeper by more than the error bound than the tolerance of the part whose face this is, or than 0 where there is none. [`Verdict::Unknown`]: the bound of the search is above [`super::ERROR_SHARE_MAX`] of the scallop limit.
@@ -142,6 +143,8 @@ pub struct SweptResult {
     pub gouge_bound_mm: f64,
     /// Whether the search for gouges ended because the surface has too many cells.
     pub gouge_cells_exhausted: bool,
+    /// Heights in a drawn region, place by place; `None` on others, and where the run is not complete.
+    pub region: Option<RegionHeights>,
     /// Ridges, one per gap, thinned to 100 000 points in total.
     pub ridges: Vec<Ridge>,
     /// Number of stations measured.
@@ -170,6 +173,7 @@ pub(super) struct Measurements<'a> {
     pub(super) shape: SurfaceCheck,
     pub(super) complete: bool,
     pub(super) requirements: &'a Requirements<'a>,
+    pub(super) region: Option<RegionHeights>,
     pub(super) original: Option<OriginalDeviation>,
 }
 
@@ -178,7 +182,8 @@ impl SweptResult {
         let deviation_mm = parts.deviation_mm.iter().copied().fold(0.0, f64::max);
         let (mut scallop_max, [most_at_stations, most_possible]) = extreme(oracle, parts);
         let (scallop_mean_mm, scallop_histogram) = mean(oracle, parts);
-        let sensitivity = sensitivity(scallop_max.height_mm, oracle.radius_mm);
+        let sensitivity_of = |height_mm: f64| sensitivity(height_mm, oracle.radius_mm);
+        let sensitivity = sensitivity_of(scallop_max.height_mm);
         let coordinates = parts.axes.extent_mm.map_or(0.0, |extent| {
             extent
                 .iter()
@@ -192,6 +197,10 @@ impl SweptResult {
             search_mm: CREST_MM + ARITHMETIC * (coordinates + oracle.radius_mm) * sensitivity,
         };
         scallop_max.error_mm += measurement_error.rounding_mm + measurement_error.search_mm;
+        let of_places_mm = |region: &RegionHeights| {
+            (deviation_mm + ROUNDING_MM) * sensitivity_of(region.highest.height_mm)
+                + measurement_error.search_mm
+        };
         let mut findings = Self {
             scallop_max,
             scallop_verdict: Verdict::Unknown,
@@ -204,6 +213,7 @@ impl SweptResult {
             gouge_floor_mm: super::POSITION_MM + deviation_mm,
             gouge_bound_mm: parts.search.bound_mm,
             gouge_cells_exhausted: parts.search.exhausted,
+            region: parts.region,
             ridges: thinned(oracle, parts),
             stations: parts.ridges.iter().map(|ridge| ridge.crests.len()).sum(),
             cells: parts.search.cells,
@@ -216,11 +226,20 @@ impl SweptResult {
         let by_original_mm = parts.original.map_or(0.0, |original| original.tolerance_mm);
         let limit_mm = job.scallop_mm * (1.0 + parts.requirements.scallop_tolerance) + by_original_mm;
         let over_surface_mm = parts.original.map_or(0.0, |original| original.over_surface_mm);
+        let region_failure = parts
+            .region
+            .as_ref()
+            .and_then(|region| region.failure(job, limit_mm - by_original_mm, of_places_mm(region)));
         let surely_above = findings.scallop_max.height_mm - findings.scallop_max.error_mm > limit_mm
             || over_surface_mm - findings.measurement_error_mm > limit_mm - by_original_mm;
-        findings.scallop_verdict = findings.judge_scallop(job, limit_mm, surely_above);
+        let of_ridges = findings.judge_scallop(job, limit_mm, surely_above);
+        findings.scallop_verdict = if region_failure.is_some() {
+            Verdict::Violated
+        } else {
+            of_ridges
+        };
         findings.gouge_verdict = findings.judge_gouge(job);
-        findings.failures = findings.failing(job);
+        findings.failures = findings.failing(job, of_ridges, region_failure);
         findings.warnings = findings.failures.clone();
         findings.warnings.extend(findings.other_warnings(job, parts));
         findings
@@ -294,13 +313,14 @@ impl SweptResult {
         job.region.is_some() && self.ridges.is_empty()
     }
 
-    fn scallop_failure(&self, job: &Job) -> Option<String> {
+    /// The reason against the ridges, by the verdict on them.
+    fn ridges_failure(&self, job: &Job, verdict: Verdict) -> Option<String> {
         let (most, limit) = (&self.scallop_max, job.scallop_mm);
         let place = format!(
             "between passes {} and {} at u = {:.6}, v = {:.6}",
             most.passes[0], most.passes[1], most.u, most.v
         );
-        match self.scallop_verdict {
+        match verdict {
             Verdict::Met => None,
             Verdict::Violated if self.uncut(job) => Some(format!("no ball reaches the material {place}")),
             Verdict::Violated if self.original.is_some() => Some(format!(
@@ -371,11 +391,12 @@ impl SweptResult {
         }
     }
 
-    fn failing(&self, job: &Job) -> Vec<String> {
+    fn failing(&self, job: &Job, of_ridges: Verdict, region_failure: Option<String>) -> Vec<String> {
         if !self.has_samples() {
             return vec!["nothing is measured: the run has no sample".to_owned()];
         }
-        let mut failures: Vec<String> = self.scallop_failure(job).into_iter().collect();
+        let mut failures: Vec<String> = self.ridges_failure(job, of_ridges).into_iter().collect();
+        failures.extend(region_failure);
         if self.gouge_verdict == Verdict::Unknown {
             failures.push(format!(
                 "gouges are not measured: searched only down to {:.6} mm, but all deeper than {:.6} mm must be seen; {}",

@@ -5,6 +5,7 @@
 //!                         │   ──tree.rs────► the same, and the nearest ball, over the whole path
 //!                         │        │
 //!                         │        ├──ridge.rs──► the ridge in each gap between two passes: maximum, mean, points
+//!                         │        ├──region.rs─► heights in a drawn region, place by place
 //!                         │        └──gouge.rs──► the deepest gouge (cells of grid.rs, split where it matters)
 //!                         └──axes.rs──► travel        shape.rs: tightest concave radius, degenerate points
 //! ```
@@ -29,6 +30,7 @@ mod gouge;
 pub(crate) mod grid;
 mod height;
 mod original;
+mod region;
 mod ridge;
 mod shape;
 mod smooth;
@@ -41,6 +43,8 @@ pub use axes::AxisTravel;
 pub use field::{FieldPoint, HeightField, height_field};
 pub use findings::{Gouge, HighestScallop, MeasurementError, Ridge, RidgePoint, SweptResult};
 pub use original::OriginalDeviation;
+pub use region::RegionHeights;
+pub use ridge::MISSED_RADII;
 pub use shape::{ConcaveRadius, SurfaceCheck};
 pub use track::{ToolPath, ToolPathPass};
 
@@ -48,6 +52,7 @@ use gouge::{GougeSearch, GougeSearchResult};
 use grid::CellGrid;
 use height::PassHeight;
 use rayon::prelude::*;
+use region::RegionSearch;
 use ridge::{Gap, GapRidge};
 use smooth::SmoothPath;
 use tree::PathTree;
@@ -141,6 +146,18 @@ pub fn measure(
             }
         });
     }
+    let is_drawn = job.region.is_some() && job.origin.reach().is_none();
+    let region = (is_drawn && complete).then(|| {
+        let search = RegionSearch {
+            job,
+            oracle,
+            tree: &tree,
+            gaps: &gaps,
+            ridges: &ridges,
+            limit_mm: job.scallop_mm * (1.0 + requirements.scallop_tolerance),
+        };
+        search.search(progress)
+    });
     let grid = CellGrid::new(oracle);
     let deviation_mm = smooth.deviation_max_mm();
     progress.begin("gouge", grid.count() as u64);
@@ -160,6 +177,7 @@ pub fn measure(
         shape: SurfaceCheck::new(oracle, &grid),
         complete,
         requirements,
+        region,
         original: OriginalDeviation::new(oracle, &grid, requirements, over_surface_mm),
     };
     SweptResult::new(job, oracle, track, &parts)

@@ -44,7 +44,7 @@ const CREST_MM: f64 = 1e-8;
 const GOLDEN_STEPS: usize = 40;
 const GOLDEN: f64 = 0.618_033_988_749_894_8;
 /// Height of a point whose ray misses both swept balls, in radii: above every measured height.
-pub(super) const MISSED_RADII: f64 = 4.0;
+pub const MISSED_RADII: f64 = 4.0;
 
 /// The highest point across a gap at one station.
 #[derive(Clone, Copy, Debug)]
