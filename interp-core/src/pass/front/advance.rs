@@ -346,98 +346,121 @@ impl Advance {
         }
     }
 
+    /// Goes on to the next station, and after the last one of these to the next task.
     fn next_station(&mut self, end: u16) {
         self.station += 1;
         if self.station < end {
             return;
         }
-        let count = self.stations.count();
-        (self.task, self.station) = match self.task {
+        self.task = match self.task {
             Task::Clear => {
                 self.start_front();
                 return;
             }
-            Task::Step if self.is_point_ahead && (self.is_covered || self.reaches_point) => {
-                self.is_on_point = true;
-                (Task::Point, 0)
-            }
-            Task::Step => {
-                let [least, most] = self.steps.map(to_f32);
-                let [from, to] = self.stepped;
-                self.is_short = self.is_whole
-                    && self.front_mm < self.period_mm * to_f32(i32::from(to.saturating_sub(from)));
-                let is_even = most > 0.0 && most <= LEVEL * least;
-                self.is_level = self.is_straight && is_even && !self.is_short;
-                self.is_short |= self.is_near_point && !self.is_level;
-                (self.after_steps(self.has_gaps), 0)
-            }
-            Task::FillForwards => (Task::FillBackwards, 0),
-            Task::FillBackwards => (self.after_steps(false), 0),
-            Task::Level | Task::Shift | Task::Point => (Task::Eliminate, 0),
-            Task::Forwards => (Task::Backwards, 0),
+            Task::Step => self.after_stepping(),
+            Task::FillForwards => Task::FillBackwards,
+            Task::FillBackwards => self.after_steps(false),
+            Task::Level | Task::Shift | Task::Point => Task::Eliminate,
+            Task::Lower => Task::Forwards,
+            Task::Forwards => Task::Backwards,
             Task::Backwards => {
                 self.limiter.begin();
-                (Task::Hull, 0)
+                Task::Hull
             }
-            Task::Hull => (Task::Apply, 0),
+            Task::Hull => Task::Apply,
             Task::Apply if !self.again => {
                 self.again = true;
-                (Task::Forwards, 0)
+                Task::Forwards
             }
-            Task::Apply => (Task::Eliminate, 0),
-            Task::Eliminate => (Task::Substitute, 0),
-            Task::Substitute => {
-                self.is_lowered = false;
-                if self.is_sharp && !self.is_shifted && !self.is_short {
-                    self.is_shifted = true;
-                    (Task::Shift, 0)
-                } else if self.is_point_ahead && self.is_covered {
-                    (Task::Done, count)
-                } else if self.is_level || self.is_short || self.is_shifted || self.is_on_point {
-                    self.excess = 0;
-                    self.begin_crests();
-                    (Task::Crest, 0)
-                } else {
-                    (Task::Compare, 0)
-                }
-            }
-            Task::Compare if self.is_lowered && self.round < ROUNDS => {
-                self.round += 1;
-                self.again = false;
-                (Task::Lower, 0)
-            }
-            Task::Compare if self.measured < MEASUREMENTS => {
-                self.is_lowered = false;
-                self.begin_crests();
-                (Task::Crest, 0)
-            }
+            Task::Apply => Task::Eliminate,
+            Task::Eliminate => Task::Substitute,
+            Task::Substitute => self.after_spline(),
+            Task::Compare => self.after_comparison(),
             Task::Crest if self.is_lowered && self.is_on_point => {
                 self.start_front();
                 self.reaches_point = false;
                 return;
             }
-            Task::Crest if self.is_lowered && self.is_short && self.measured < MEASUREMENTS => {
-                self.measured += 1;
-                // What is beyond the boundary is a pass on it.
-                self.line = self.line.min(self.direction.end).saturating_sub(self.excess);
-                (Task::Level, 0)
-            }
-            Task::Crest if self.is_short => (Task::Done, count),
-            Task::Crest if self.is_lowered && self.is_level => {
-                // Not straight after all, or with the common margin.
-                self.is_level = false;
-                (Task::Level, 0)
-            }
-            Task::Crest if self.is_lowered && self.measured < MEASUREMENTS => {
-                self.is_shifted = false;
-                self.measured += 1;
-                self.round = 0;
-                self.again = false;
-                (Task::Lower, 0)
-            }
-            Task::Lower => (Task::Forwards, 0),
-            _ => (Task::Done, count),
+            Task::Crest => self.after_crests(),
+            _ => Task::Done,
         };
+        self.station = match self.task {
+            Task::Done => self.stations.count(),
+            _ => 0,
+        };
+    }
+
+    /// Every station has made its step.
+    fn after_stepping(&mut self) -> Task {
+        if self.is_point_ahead && (self.is_covered || self.reaches_point) {
+            self.is_on_point = true;
+            return Task::Point;
+        }
+        let [least, most] = self.steps.map(to_f32);
+        let [from, to] = self.stepped;
+        self.is_short =
+            self.is_whole && self.front_mm < self.period_mm * to_f32(i32::from(to.saturating_sub(from)));
+        let is_even = most > 0.0 && most <= LEVEL * least;
+        self.is_level = self.is_straight && is_even && !self.is_short;
+        self.is_short |= self.is_near_point && !self.is_level;
+        self.after_steps(self.has_gaps)
+    }
+
+    /// The curve through the stations is made.
+    fn after_spline(&mut self) -> Task {
+        self.is_lowered = false;
+        if self.is_sharp && !self.is_shifted && !self.is_short {
+            self.is_shifted = true;
+            Task::Shift
+        } else if self.is_point_ahead && self.is_covered {
+            Task::Done
+        } else if self.is_level || self.is_short || self.is_shifted || self.is_on_point {
+            self.excess = 0;
+            self.begin_crests();
+            Task::Crest
+        } else {
+            Task::Compare
+        }
+    }
+
+    /// The curve was compared with the steps between its stations.
+    fn after_comparison(&mut self) -> Task {
+        if self.is_lowered && self.round < ROUNDS {
+            self.round += 1;
+            self.again = false;
+            Task::Lower
+        } else if self.measured < MEASUREMENTS {
+            self.is_lowered = false;
+            self.begin_crests();
+            Task::Crest
+        } else {
+            Task::Done
+        }
+    }
+
+    /// The crests were measured.
+    fn after_crests(&mut self) -> Task {
+        let is_again = self.is_lowered && self.measured < MEASUREMENTS;
+        if self.is_short && is_again {
+            self.measured += 1;
+            // What is beyond the boundary is a pass on it.
+            self.line = self.line.min(self.direction.end).saturating_sub(self.excess);
+            Task::Level
+        } else if self.is_short {
+            Task::Done
+        } else if self.is_lowered && self.is_level {
+            // Not straight after all, or with the common margin.
+            self.is_level = false;
+            Task::Level
+        } else if is_again {
+            self.is_shifted = false;
+            self.measured += 1;
+            self.round = 0;
+            self.again = false;
+            Task::Lower
+        } else {
+            Task::Done
+        }
     }
 
     /// A row of a sweep.
