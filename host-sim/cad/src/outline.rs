@@ -9,7 +9,11 @@ const FOLLOWS_MM: f64 = 1e-3;
 /// Tolerance of an end of the rectangle on a knot, mm: a patch that is narrower is rounding of the file.
 const KNOT_MM: f64 = 1e-4;
 /// A derivative shorter than this, times its range, is that of a degenerate boundary, mm.
-const POLE_MM: f64 = 1e-6;
+const POLE_MM: f64 = 1e-3;
+/// Two parameters are opposite to one another if they are half a period apart within this share of it.
+const OPPOSITE: f64 = 1e-6;
+/// A loop goes straight back from a pole if it leaves it within this share of the period of where it came from.
+const BACK: f64 = 1e-6;
 /// Largest difference between the area of a loop of iso-parametric lines and that of its bounding rectangle, as a share: an
 /// L shape differs by much more.
 const AREA_SLACK: f64 = 1e-3;
@@ -54,8 +58,8 @@ pub(super) fn winding(paths: &[Path]) -> Winding {
 }
 
 /// The loops of a face in parameters. Those that do not wind around a closed surface lie in the turn of the largest one.
-pub(super) fn paths(on: &Periodic<'_>, loops: &[Vec<Edge>]) -> Vec<Path> {
-    let mut paths: Vec<Path> = loops.iter().map(|edges| trace(on, edges)).collect();
+pub(super) fn paths(on: &Periodic<'_>, loops: &[Vec<Edge>], sense: f64) -> Vec<Path> {
+    let mut paths: Vec<Path> = loops.iter().map(|edges| trace(on, edges, sense)).collect();
     let periods = on.periods;
     for path in &mut paths {
         path.seam = (0..2).find(|k| {
@@ -150,7 +154,69 @@ fn reach(on: &Periodic<'_>, k: usize) -> f64 {
     on.periods[k].unwrap_or(range)
 }
 
-fn trace(on: &Periodic<'_>, edges: &[Edge]) -> Path {
+/// A loop in parameters. `sense`: 1 if the face's normal is along S_u x S_v, -1 against it; the face is to the left of its loops.
+fn trace(on: &Periodic<'_>, edges: &[Edge], sense: f64) -> Path {
+    let (path, is_turned) = traced(on, edges, sense);
+    if !is_turned || path.winding == [0.0; 2] {
+        return path;
+    }
+    // A loop that is the wrong way round: it does not wind around the surface if it leaves its pole the other way.
+    let (other, _) = traced(on, edges, -sense);
+    if other.winding == [0.0; 2] { other } else { path }
+}
+
+/// A parameter of a closed surface along a loop. At a pole it is undefined: there the loop goes on along the degenerate line, so that the face is to its left.
+#[derive(Clone, Copy, Default)]
+struct Turning {
+    /// The parameter at the last place off the pole, and at the one before; the other parameter there.
+    last: Option<[f64; 2]>,
+    before: Option<f64>,
+    /// The other parameter at the pole, where the loop is at one.
+    pole: Option<f64>,
+}
+
+impl Turning {
+    /// The parameter at a place off the pole. `direction`: of the degenerate line at the upper end of the other parameter.
+    fn follow(&mut self, raw: f64, across: f64, period: Option<f64>, direction: f64) -> f64 {
+        let value = match (self.last, period) {
+            (Some([last, beside]), Some(period)) => {
+                let apart = raw - last;
+                // From one side to the opposite one the line leads through the pole.
+                let is_opposite = (apart.abs() - 0.5 * period).abs() < OPPOSITE * period;
+                let toward = match (self.pole, self.before) {
+                    (Some(pole), _) => pole - beside,
+                    (None, Some(before)) if is_opposite => beside - before,
+                    _ => 0.0,
+                };
+                if toward == 0.0 {
+                    raw
+                } else {
+                    last + along_pole(apart, period, direction * toward.signum())
+                }
+            }
+            _ => raw,
+        };
+        self.before = self.last.map(|[_, beside]| beside);
+        self.last = Some([value, across]);
+        self.pole = None;
+        value
+    }
+}
+
+/// The way along a degenerate line in this direction by a difference of parameters; 0 where the loop goes straight back.
+fn along_pole(apart: f64, period: f64, direction: f64) -> f64 {
+    let way = (direction * apart).rem_euclid(period);
+    let slack = BACK * period;
+    if way < slack || period - way < slack {
+        let turns = (apart / period).round();
+        apart - turns * period
+    } else {
+        direction * way
+    }
+}
+
+/// A loop in parameters, and whether it is on a pole somewhere.
+fn traced(on: &Periodic<'_>, edges: &[Edge], sense: f64) -> (Path, bool) {
     let periods = on.periods;
     let mut path = Path {
         edges: Vec::new(),
@@ -158,7 +224,14 @@ fn trace(on: &Periodic<'_>, edges: &[Edge]) -> Path {
         seam: None,
         off_mm: 0.0,
     };
-    let mut near = None;
+    // At the upper end of v the face is to the left of -u, at that of u to the left of v.
+    let directions = [-sense, sense];
+    let mut turnings = [Turning::default(); 2];
+    let mut near: Option<[f64; 2]> = None;
+    // The first place off the pole, and whether the loop begins on it.
+    let mut firsts: [Option<[f64; 2]>; 2] = [None; 2];
+    let mut begins_on_pole = [None; 2];
+    let mut is_polar = false;
     for edge in edges {
         let mut places: Vec<[f64; 2]> = Vec::with_capacity(edge.len());
         let mut polar = Vec::with_capacity(edge.len());
@@ -166,10 +239,20 @@ fn trace(on: &Periodic<'_>, edges: &[Edge]) -> Path {
             let (mut place, off_mm) = on.invert(*point, near);
             path.off_mm = path.off_mm.max(off_mm);
             let on_pole = [0, 1].map(|k| speed(on, place, k) * reach(on, k) < POLE_MM);
+            let raw = place;
             for k in 0..2 {
-                if let Some(near) = near.filter(|_| on_pole[k]) {
-                    let near: [f64; 2] = near;
-                    place[k] = near[k];
+                let turning = &mut turnings[k];
+                if on_pole[k] {
+                    is_polar = true;
+                    if turning.last.is_none() {
+                        begins_on_pole[k] = Some(raw[1 - k]);
+                    } else {
+                        turning.pole = Some(raw[1 - k]);
+                    }
+                    place[k] = near.map_or(raw[k], |near| near[k]);
+                } else {
+                    place[k] = turning.follow(raw[k], raw[1 - k], periods[k], directions[k]);
+                    firsts[k].get_or_insert([place[k], raw[1 - k]]);
                 }
             }
             near = Some(place);
@@ -184,10 +267,26 @@ fn trace(on: &Periodic<'_>, edges: &[Edge]) -> Path {
     }
     let first = path.edges.iter().flatten().next().copied();
     if let (Some(first), Some(last)) = (first, near) {
-        path.winding =
-            std::array::from_fn(|k| periods[k].map_or(0.0, |period| ((last[k] - first[k]) / period).round()));
+        path.winding = std::array::from_fn(|k| {
+            let Some(period) = periods[k] else {
+                return 0.0;
+            };
+            // Where the loop ends on a pole it goes on to its first place off it.
+            let pole = begins_on_pole[k].or(turnings[k].pole);
+            let (start, end) = match (pole, firsts[k]) {
+                (Some(_), Some([start, beside])) => {
+                    turnings[k].pole = pole;
+                    (
+                        start,
+                        turnings[k].follow(start, beside, Some(period), directions[k]),
+                    )
+                }
+                _ => (first[k], last[k]),
+            };
+            ((end - start) / period).round()
+        });
     }
-    path
+    (path, is_polar)
 }
 
 /// At a degenerate point the parameter k is undefined; takes that of the nearest other point of the edge.
@@ -242,7 +341,7 @@ pub fn outline(face: &Face) -> Result<Outline, String> {
         Boundary::Loops(loops) => loops,
     };
     let on = Periodic::new(surface);
-    let paths = paths(&on, loops);
+    let paths = paths(&on, loops, face.sense);
     let off_mm = paths.iter().map(|path| path.off_mm).fold(0.0, f64::max);
     let mut rectangle = around(&paths);
     let holes_alone = complementary(&on, &paths, face.sense);

@@ -78,7 +78,7 @@ pub fn trim(
         Boundary::Loops(loops) => loops,
     };
     let on = &Periodic::new(surface);
-    let paths = paths(on, loops);
+    let paths = paths(on, loops, face.sense);
     let off_mm = paths.iter().map(|path| path.off_mm).fold(0.0, f64::max);
     if off_mm > OFF_MM {
         return Err(format!("its boundary lies {off_mm:.4} mm off its surface").into());
@@ -151,7 +151,7 @@ pub fn polylines(face: &Face, tolerance_mm: f64) -> Vec<Vec<DVec3>> {
         Boundary::Unknown(_) => return Vec::new(),
     };
     let on = Periodic::new(surface);
-    let paths = paths(&on, loops);
+    let paths = paths(&on, loops, face.sense);
     loops
         .iter()
         .zip(&paths)

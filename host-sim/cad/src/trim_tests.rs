@@ -252,6 +252,99 @@ fn poles_are_enclosed() {
     );
 }
 
+/// Edges the other way round.
+fn backwards(edges: &[Edge]) -> Vec<Edge> {
+    let turned = |edge: &Edge| edge.iter().rev().copied().collect();
+    edges.iter().rev().map(turned).collect()
+}
+
+/// Both directions of the loop with the sense that belongs to it, and every edge as the first one.
+fn is_area_of_loop(surface: &Surface, edges: &[Edge], wanted: f64) {
+    for first in 0..edges.len() {
+        let mut edges = edges.to_vec();
+        edges.rotate_left(first);
+        is_area(&face(surface.clone(), vec![edges.clone()], 1.0), wanted);
+        is_area(&face(surface.clone(), vec![backwards(&edges)], -1.0), wanted);
+    }
+}
+
+/// Sectors whose loops run through a pole, at which the angle is undefined: those of half a turn and more were taken for the whole surface of revolution.
+#[test]
+fn sectors_end_at_a_pole() {
+    let cone = Surface::Cone {
+        origin: DVec3::ZERO,
+        x: DVec3::X,
+        y: DVec3::Y,
+        z: DVec3::Z,
+        radius: 6.0,
+        slope: -0.75,
+    };
+    let (sphere, apex, slant) = (sphere(10.0), 8.0, 10.0);
+    for angle in [0.5, FRAC_PI_2, PI, 3.3, 1.5 * PI, 6.0] {
+        for start in [0.0, -2.5] {
+            let end = start + angle;
+            let sector = |surface: &Surface, [rim, pole]: [f64; 2]| {
+                vec![
+                    straight(surface, [start, rim], [end, rim]),
+                    straight(surface, [end, rim], [end, pole]),
+                    straight(surface, [start, pole], [start, rim]),
+                ]
+            };
+            // Both nappes of the cone; the rim of the second is above its apex.
+            is_area_of_loop(&cone, &sector(&cone, [0.0, apex]), 0.5 * angle * 6.0 * slant);
+            let above = backwards(&sector(&cone, [2.0 * apex, apex]));
+            is_area_of_loop(&cone, &above, 0.5 * angle * 6.0 * slant);
+            let cap = angle * 100.0 * (1.0 - 0.4_f64.sin());
+            is_area_of_loop(&sphere, &sector(&sphere, [0.4, FRAC_PI_2]), cap);
+            is_area_of_loop(&sphere, &backwards(&sector(&sphere, [-0.4, -FRAC_PI_2])), cap);
+            // From pole to pole.
+            let lune = [
+                straight(&sphere, [start, FRAC_PI_2], [start, -FRAC_PI_2]),
+                straight(&sphere, [end, -FRAC_PI_2], [end, FRAC_PI_2]),
+            ];
+            is_area_of_loop(&sphere, &lune, 2.0 * angle * 100.0);
+            // A loop of one pole that is the wrong way round has one inside all the same.
+            is_area(
+                &face(cone.clone(), vec![sector(&cone, [0.0, apex])], -1.0),
+                0.5 * angle * 6.0 * slant,
+            );
+            // A rim that is no line of the surface.
+            let wave = edge(&cone, |share| {
+                let u = start + share * angle;
+                [u, 1.0 + (TAU * share).sin()]
+            });
+            let [_, rise, fall] = <[Edge; 3]>::try_from(sector(&cone, [1.0, apex])).unwrap();
+            let steps = 20_000;
+            let strip = |k: i32| {
+                let v = 1.0 + (TAU * (f64::from(k) + 0.5) / f64::from(steps)).sin();
+                0.5 * angle * (6.0 - 0.75 * v) * slant * (apex - v) / apex / f64::from(steps)
+            };
+            is_area_of_loop(&cone, &[wave, rise, fall], (0..steps).map(strip).sum());
+        }
+    }
+}
+
+/// A plane through the axis cuts a cap in one edge, on which the pole is a point among others or between two.
+#[test]
+fn edges_run_through_a_pole() {
+    let sphere = sphere(10.0);
+    let cap = PI * 100.0 * (1.0 - 0.4_f64.sin());
+    for start in [0.0, 1.0, -2.5, 3.0] {
+        let rim = straight(&sphere, [start, 0.4], [start + PI, 0.4]);
+        let away = FRAC_PI_2 - 0.4;
+        for count in [64, 65, 31] {
+            let over: Edge = (0..=count)
+                .map(|k| {
+                    let along = away * (1.0 - 2.0 * f64::from(k) / f64::from(count));
+                    let u = start + if along > 0.0 { PI } else { 0.0 };
+                    sphere.at_periodic(u, FRAC_PI_2 - along.abs()).point
+                })
+                .collect();
+            is_area_of_loop(&sphere, &[rim.clone(), over], cap);
+        }
+    }
+}
+
 /// A torus with a tube that is wider than its ring meets its axis at two points, which part it into an outer and an inner sheet: a cap of either ends in one
 /// of them.
 #[test]

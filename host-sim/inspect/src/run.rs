@@ -124,7 +124,7 @@ pub fn time_run(job: &Job, prepared: &Prepared, progress: &dyn Progress) -> Resu
     let samples_per_second = samples as f64 / elapsed.max(1e-9);
     let fault = result
         .err()
-        .map(|fault| FaultAt::of(fault, &machine, samples, prepared));
+        .map(|fault| FaultAt::of(fault, &machine, samples, prepared, job));
     Ok(TimedRun {
         digest: run.value(),
         samples,
@@ -146,7 +146,7 @@ pub fn centres_of_run(job: &Job, prepared: &Prepared) -> Result<(Vec<DVec3>, Opt
         true
     });
     let fault = ran.err();
-    let fault = fault.map(|fault| FaultAt::of(fault, &machine, centres_mm.len() as u64, prepared));
+    let fault = fault.map(|fault| FaultAt::of(fault, &machine, centres_mm.len() as u64, prepared, job));
     Ok((centres_mm, fault))
 }
 

@@ -11,6 +11,8 @@ use crate::{homing, spindle, steps};
 /// Largest clearance and plunge, mm.
 const HEIGHT_MAX_MM: f64 = 1000.0;
 
+/// Ranges of the limits that the core takes: mm/s, mm/s^2, mm/s^3.
+const LIMIT_RANGES: [[f64; 2]; 3] = [[1e-3, 1e5], [1e-2, 1e7], [1e-1, 1e9]];
 /// Expected value of a key with three limits, for messages.
 const LIMITS: &str = "three numbers above 0, one each for x, y and z, e.g. [100, 100, 50]";
 
@@ -70,12 +72,20 @@ pub(super) fn read_profile(document: &Section<'_>) -> Result<MachineProfile, Job
 
 /// The limits of the axes, if any of them is given.
 fn read_limits(machine: &Section<'_>) -> Result<Option<AxisLimits>, JobError> {
-    let [velocity, acceleration, jerk, ..] = COMMON;
-    Ok(AxisLimits::of_given(
-        machine.positive_axes(velocity, LIMITS)?,
-        machine.positive_axes(acceleration, LIMITS)?,
-        machine.positive_axes(jerk, LIMITS)?,
-    ))
+    let mut given = [None; 3];
+    for ((key, [least, most]), given) in COMMON.iter().zip(LIMIT_RANGES).zip(&mut given) {
+        *given = machine.positive_axes(key, LIMITS)?;
+        let outside = given
+            .iter()
+            .flatten()
+            .find(|value| !(least..=most).contains(value));
+        if let Some(value) = outside {
+            let what = format!("`{key}` must be {least} to {most}, not {value}");
+            return Err(machine.error(key, what, format!("give {LIMITS}")));
+        }
+    }
+    let [velocity, acceleration, jerk] = given;
+    Ok(AxisLimits::of_given(velocity, acceleration, jerk))
 }
 
 /// The optional section `[machine]` of a job, on a machine with this profile.

@@ -331,6 +331,7 @@ fn ranges() {
         (REVOLVED, "90, 20]", "90, -20]", 3, 13, "the profile's radius is negative: -20 mm at u = 0"),
         (REVOLVED, "1000", "1", 21, 13, "`period_us` must be 10 to 100000, not 1"),
         (REVOLVED, "[100, 100, 50]", "[100, 0, 50]", 22, 21, "`velocity_max_mm_s` must be above 0, not 0"),
+        (REVOLVED, "[100, 100, 50]", "[100, 1e9, 50]", 22, 21, "`velocity_max_mm_s` must be 0.001 to 100000, not 1000000000"),
         (REVOLVED, "[-500, 500]", "[500, -500]", 25, 13, "the travel of x must ascend"),
         (REVOLVED, "[-500, 500]", "[-500, 5000]", 25, 13, "`travel_mm` reaches 5000 mm; the machine's range is ±2147.483 mm"),
         (REVOLVED, "period_us = 1000", "home_mm = [3000, 0, 10]", 21, 11, "`home_mm` reaches 3000 mm; the machine's range is ±2147.483 mm"),

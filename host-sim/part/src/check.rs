@@ -51,6 +51,8 @@ pub struct PartCheck {
     pub counts: [usize; 2],
     /// Greatest depth that is allowed, mm.
     pub tolerance_mm: f64,
+    /// Number of faces of the part that could not be read as surfaces: whether the tool cuts them is not known.
+    pub unknown: usize,
     /// What the passes leave of the reachable part of the face.
     pub leftover: Leftover,
     /// Tick of the deepest place on the passes.
@@ -90,17 +92,18 @@ pub fn check_run(
         deepest,
         counts: [centres.centres.len(), between.len()],
         tolerance_mm: request.touch_mm,
+        unknown: reach.unknown.len(),
         leftover,
         tick,
         failures: Vec::new(),
         warnings: Vec::new(),
     };
-    check.judge(reach.unknown.len());
+    check.judge();
     Ok(Some(check))
 }
 
 impl PartCheck {
-    fn judge(&mut self, unknown: usize) {
+    fn judge(&mut self) {
         for (found, place) in self.deepest.iter().flatten().zip(["on a pass", "between passes"]) {
             if let Some(found) = found.filter(|found| self.is_too_deep(found)) {
                 self.failures.push(format!(
@@ -117,11 +120,6 @@ impl PartCheck {
                 "the neighbouring faces are not known to the job: whether the tool cuts them is not checked; name their file in [part]"
                     .to_owned(),
             );
-        }
-        if unknown > 0 {
-            self.warnings.push(format!(
-                "{unknown} faces of the part are not known: whether the tool cuts them is not checked"
-            ));
         }
         if self.leftover.within_mm2 < WITHIN_SHARE * self.leftover.reachable_mm2 {
             self.warnings.push(format!(

@@ -81,7 +81,7 @@ pub(super) fn json(
         "data_bytes": prepared.data_bytes(),
         "data_bytes_max": STORE_BYTES,
         "stations": found.stations,
-        "not_measured": not_measured(found, axes),
+        "not_measured": not_measured(job, found, axes),
         "warnings": found.warnings,
     });
     match value {
@@ -91,7 +91,7 @@ pub(super) fn json(
 }
 
 /// The keys of the figures that could not be measured.
-fn not_measured(found: &SweptResult, [velocity, acceleration, jerk]: &Peaks) -> Vec<&'static str> {
+fn not_measured(job: &Job, found: &SweptResult, [velocity, acceleration, jerk]: &Peaks) -> Vec<&'static str> {
     let figures = [
         ("scallop_max_mm", found.scallop_verdict),
         ("gouge_max_mm", found.gouge_verdict),
@@ -99,9 +99,9 @@ fn not_measured(found: &SweptResult, [velocity, acceleration, jerk]: &Peaks) -> 
         ("limits.acceleration", acceleration.verdict),
         ("limits.jerk", jerk.verdict),
     ];
-    let unknown = figures
-        .into_iter()
-        .filter(|(_, verdict)| *verdict == Verdict::Unknown);
+    let unknown = figures.into_iter().filter(|(key, verdict)| {
+        *verdict == Verdict::Unknown && !(*key == "scallop_max_mm" && found.has_no_gap(job))
+    });
     unknown.map(|(key, _)| key).collect()
 }
 
@@ -237,6 +237,11 @@ pub(super) fn print(
 }
 
 fn scallop(job: &Job, found: &SweptResult) {
+    if found.has_no_gap(job) && found.scallop_verdict == Verdict::Unknown {
+        row("scallop height", "no two passes beside each other: no ridge");
+        region(job, found);
+        return;
+    }
     if found.ridges.is_empty() {
         say!(
             "  {} {:<22} not measured: fewer than two whole passes",

@@ -56,6 +56,9 @@ pub(super) struct Arguments {
     /// Accepts scallops this much above the limit: in percent, or as a share (1% or 0.01).
     #[arg(long, value_name = "SHARE", value_parser = numbers::share, default_value = "0%")]
     scallop_tolerance: f64,
+    /// Passes a job although faces of its part are not known, so that whether the tool cuts them is not checked.
+    #[arg(long)]
+    accept_unknown_faces: bool,
     /// Prints one JSON object instead of text.
     #[arg(long)]
     pub(super) json: bool,
@@ -348,6 +351,24 @@ fn load(arguments: &Arguments, path: &Path) -> Result<(Job, Prepared)> {
     home::load(path, profile.as_ref(), arguments.placed.origin, None)
 }
 
+/// Faces of the part that are not known: a reason against the job unless they are accepted.
+fn unknown_faces(check: &PartCheck, is_accepted: bool, found: &mut Verification) {
+    if check.unknown == 0 {
+        return;
+    }
+    let what = format!(
+        "{} faces of the part are not known: whether the tool cuts them is not checked",
+        check.unknown
+    );
+    if is_accepted {
+        found.warnings.push(what);
+    } else {
+        found.failures.push(format!(
+            "{what}; repair them in the CAD system (the header of the job names them), or look at them and give --accept-unknown-faces"
+        ));
+    }
+}
+
 /// The job of passes of constant scallop height with straight ones, as it would be run.
 fn straight(job: &Job, stop: Stop) -> Option<(Job, Prepared)> {
     let job = Job {
@@ -408,6 +429,7 @@ fn verify_job(
     };
     if let Some(check) = &check {
         found.failures.extend(check.failures.iter().cloned());
+        unknown_faces(check, arguments.accept_unknown_faces, &mut found);
         found.warnings.extend(check.warnings.iter().cloned());
     }
     let RunMeasurements { findings, swept, .. } = &found.measured;

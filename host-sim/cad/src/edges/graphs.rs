@@ -13,7 +13,7 @@ use crate::outline::{Path, Winding, constant, paths, winding};
 use crate::remap::Remap;
 use crate::spline::{Axis, Pole, SplineCurve, SplineSurface};
 use crate::surface::{Periodic, Surface};
-use crate::{Edge, Outline};
+use crate::{Edge, Face, Outline};
 
 /// Most spans of an edge for each span of the surface.
 const SPANS_MAX: usize = 16;
@@ -25,7 +25,8 @@ const LOOKS: usize = 64;
 const DIFFERENCE: f64 = 1e-6;
 
 /// The patch; `None` where the surface has no lines, or the edges are others.
-pub(super) fn between(surface: &Surface, loops: &[Vec<Edge>], now: &Outline) -> Option<SplineSurface> {
+pub(super) fn between(face: &Face, loops: &[Vec<Edge>], now: &Outline) -> Option<SplineSurface> {
+    let surface = &face.surface;
     if !matches!(
         surface,
         Surface::Cylinder { .. } | Surface::Cone { .. } | Surface::Extrusion { .. }
@@ -33,7 +34,7 @@ pub(super) fn between(surface: &Surface, loops: &[Vec<Edge>], now: &Outline) -> 
         return None;
     }
     let on = Periodic::new(surface);
-    let paths = paths(&on, loops);
+    let paths = paths(&on, loops, face.sense);
     let (chains, range) = match winding(&paths) {
         Winding::None => beside(&on, loops, &paths)?,
         Winding::Along(0) => (around(&on, loops, &paths)?, now.rectangle[0]),

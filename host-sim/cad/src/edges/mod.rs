@@ -36,7 +36,7 @@ pub(super) fn along_edges(face: &Face, now: &Outline) -> Option<(Face, Outline)>
     }
     let surface = plane::of(&face.surface)
         .and_then(|plane| plane.between(loops))
-        .or_else(|| graphs::between(&face.surface, loops, now))?;
+        .or_else(|| graphs::between(face, loops, now))?;
     let face = Face {
         surface: Surface::Spline(surface),
         ..face.clone()

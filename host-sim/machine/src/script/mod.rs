@@ -69,8 +69,12 @@ impl Script {
     /// # Errors
     /// As [`Script::load`].
     pub fn parse(name: &str, text: &str) -> Result<Self, JobError> {
+        // Some editors begin a file with a mark of its byte order.
+        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         let mut script = Self::default();
         let mut start = 0;
+        // The line after which the feed is 0 for good.
+        let mut stands: Option<std::ops::Range<usize>> = None;
         for whole in text.split_inclusive('\n') {
             let line = whole.split('#').next().unwrap_or("");
             let words = line.trim();
@@ -79,10 +83,39 @@ impl Script {
                 script
                     .add(words)
                     .map_err(|(what, remedy)| JobError::at(name, text, at..at + words.len(), what, remedy))?;
+                stands = script
+                    .stands_for_ever()
+                    .then(|| stands.unwrap_or(at..at + words.len()));
             }
             start += whole.len();
         }
-        Ok(script)
+        match stands {
+            Some(line) => Err(JobError::at(
+                name,
+                text,
+                line,
+                "the feed is 0 from here on, so the run would never end".to_owned(),
+                "let another override follow, or hold, stop or abort".to_owned(),
+            )),
+            None => Ok(script),
+        }
+    }
+
+    /// Whether the script leaves a run at an override of 0, neither held nor ended.
+    fn stands_for_ever(&self) -> bool {
+        let mut steps = self.steps.iter().rev();
+        let last = steps.find_map(|(period, inputs)| Some((*period, inputs.override_percent?)));
+        let Some((since, 0)) = last else {
+            return false;
+        };
+        let mut steps = self.steps.iter().rev();
+        let action = steps.find_map(|(period, inputs)| Some((*period, inputs.action?)));
+        !action.is_some_and(|(period, action)| match action {
+            Command::Hold | Command::Stop | Command::Abort => true,
+            // Its ways obey the override.
+            Command::Pause => period < since,
+            Command::Resume | Command::Start => false,
+        })
     }
 
     /// The steps: period and inputs; each period once.
@@ -174,7 +207,9 @@ fn read_action(text: &str) -> Result<Inputs, (String, String)> {
             }),
             None => Err((
                 format!("`{text}` is no feed override"),
-                format!("write `override P` with P from 0 to {OVERRIDE_MAX_PERCENT} percent"),
+                format!(
+                    "write `override P` with P a whole number of percent from 0 to {OVERRIDE_MAX_PERCENT}"
+                ),
             )),
         };
     }
@@ -215,6 +250,17 @@ mod tests {
         assert_eq!(script.at(40).override_percent, Some(150));
         assert_eq!(script.at(41), Inputs::default());
         assert_eq!(Script::parse("s", "\n# nothing\n").unwrap(), Script::default());
+        assert_eq!(Script::parse("s", &format!("\u{feff}{text}")).unwrap(), script);
+        // A run that stands at the end has to be held or ended.
+        for end in [
+            "tick 20: hold\n",
+            "tick 20: stop\n",
+            "tick 20: abort\n",
+            "tick 20: override 5\n",
+        ] {
+            Script::parse("s", &format!("tick 9: override 0\n{end}")).unwrap();
+        }
+        Script::parse("s", "tick 9: pause\ntick 900: override 0\n").unwrap();
     }
 
     #[test]
@@ -229,6 +275,26 @@ mod tests {
             ("tick 5 hold\n", 1, "`tick 5 hold` has no colon"),
             ("# a\ntock 5: hold\n", 2, "`tock 5` is no tick"),
             ("tick5: hold\n", 1, "`tick5` is no tick"),
+            (
+                "tick 5: override 37.5\n",
+                1,
+                "`override 37.5` is no feed override",
+            ),
+            (
+                "tick 5: override 0\ntick 9: override 10\n\ntick 20: override 0\n# end\n",
+                4,
+                "the feed is 0 from here on",
+            ),
+            (
+                "tick 5: override 0\ntick 9: hold\ntick 10: resume\n",
+                1,
+                "the feed is 0 from here on",
+            ),
+            (
+                "tick 5: override 0\ntick 9: pause\n",
+                1,
+                "the feed is 0 from here on",
+            ),
             ("tick -5: hold\n", 1, "`-5` is no number"),
             ("tick 5: wait\n", 1, "`wait` is nothing an operator can do"),
             ("tick 5: hold on\n", 1, "`hold on` is nothing"),

@@ -145,6 +145,8 @@ pub struct SweptResult {
     pub gouge_cells_exhausted: bool,
     /// Heights in a drawn region, place by place; `None` on others, and where the run is not complete.
     pub region: Option<RegionHeights>,
+    /// Whether the run reached its end.
+    pub is_complete: bool,
     /// Ridges, one per gap, thinned to 100 000 points in total.
     pub ridges: Vec<Ridge>,
     /// Number of stations measured.
@@ -214,6 +216,7 @@ impl SweptResult {
             gouge_bound_mm: parts.search.bound_mm,
             gouge_cells_exhausted: parts.search.exhausted,
             region: parts.region,
+            is_complete: parts.complete,
             ridges: thinned(oracle, parts),
             stations: parts.ridges.iter().map(|ridge| ridge.crests.len()).sum(),
             cells: parts.search.cells,
@@ -308,9 +311,10 @@ impl SweptResult {
             .max(gouge_allowed_mm(job))
     }
 
-    /// Whether the job's region holds no two neighbouring passes.
-    fn has_no_gap(&self, job: &Job) -> bool {
-        job.region.is_some() && self.ridges.is_empty()
+    /// Whether the job's region holds no two neighbouring passes, so that there is no ridge to be measured.
+    #[must_use]
+    pub fn has_no_gap(&self, job: &Job) -> bool {
+        job.region.is_some() && self.ridges.is_empty() && self.is_complete
     }
 
     /// The reason against the ridges, by the verdict on them.
@@ -455,7 +459,8 @@ impl SweptResult {
                 "{skipped} stations without a normal were left out of the scallop measurement"
             ));
         }
-        if self.has_no_gap(job) && parts.complete {
+        warnings.extend(self.region.as_ref().and_then(|region| region.warning(job)));
+        if self.has_no_gap(job) {
             warnings.push(
                 "the region holds no two passes beside each other: there is no scallop between passes to be measured"
                     .to_owned(),

@@ -25,6 +25,8 @@ const PLACES_MAX: f64 = 1.5e6;
 const SPEED_LINES: u32 = 24;
 /// A local maximum is searched where it is above this share of the limit.
 const SEARCHED_SHARE: f64 = 0.5;
+/// Share of a region above the limit beside its boundary that is worth a warning.
+const WORTH_SHARE: f64 = 1e-3;
 /// Steps of the golden section: 1e-5 of the spacing of places.
 const GOLDEN_STEPS: u32 = 24;
 const GOLDEN: f64 = 0.618_033_988_749_894_8;
@@ -61,6 +63,27 @@ impl RegionHeights {
                  (measured within {error_mm:.1e} mm): ask for scallop_mm = {:.3e}",
                 job.scallop_mm,
                 ASKED_SHARE * job.scallop_mm * limit_mm / height_mm
+            )
+        })
+    }
+}
+
+impl RegionHeights {
+    /// What a user has to know of the strip beside the region's boundary.
+    pub(super) fn warning(&self, job: &Job) -> Option<String> {
+        (self.above_share > WORTH_SHARE).then(|| {
+            let height_mm = self.highest_beside.height_mm;
+            let most = if height_mm >= MISSED_RADII * job.radius_mm {
+                "no ball reaches some of it".to_owned()
+            } else {
+                format!("up to {height_mm:.4} mm")
+            };
+            let [u, v] = self.highest_beside.uv;
+            format!(
+                "{:.1} % of the region, nearer than half a step-over to its boundary, is left higher than the limit ({most}, at u = {u:.4}, v = {v:.4}): draw the region larger by half a \
+                 step-over ({:.2} mm on a plane) where nothing is in the way",
+                100.0 * self.above_share,
+                0.5 * job.plane_step_over_mm()
             )
         })
     }
