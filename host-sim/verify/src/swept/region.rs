@@ -25,6 +25,8 @@ const PLACES_MAX: f64 = 1.5e6;
 const SPEED_LINES: u32 = 24;
 /// A local maximum is searched where it is above this share of the limit.
 const SEARCHED_SHARE: f64 = 0.5;
+/// Share by which a place may be above the limit: how far it is from the boundary is taken by the metric at the place, and a place beyond half a step-over by 0.5 % of it is 1 % higher.
+const SERVED_SLACK: f64 = super::ERROR_SHARE_MAX;
 /// Share of a region above the limit beside its boundary that is worth a warning.
 const WORTH_SHARE: f64 = 1e-3;
 /// Steps of the golden section: 1e-5 of the spacing of places.
@@ -54,7 +56,7 @@ impl RegionHeights {
     /// The reason against a job whose limit is exceeded by more than the error, mm.
     pub(super) fn failure(&self, job: &Job, limit_mm: f64, error_mm: f64) -> Option<String> {
         let (height_mm, [u, v]) = (self.highest.height_mm, self.highest.uv);
-        (height_mm - error_mm > limit_mm).then(|| {
+        (height_mm - error_mm > limit_mm * (1.0 + SERVED_SLACK)).then(|| {
             if height_mm >= MISSED_RADII * job.radius_mm {
                 return format!("no ball reaches the material at u = {u:.6}, v = {v:.6}, half a step-over or more within the region");
             }
