@@ -102,7 +102,7 @@
 //! # Streamed jobs
 //!
 //! A job whose header has a window ([`interp_core::job::stream`]) may have more words than the store. `JobEnd` then follows when the first rows are sent, as many as the
-//! window has, or all; and after it further chunks, also while the job runs, up to the word that `room` of the status or the last `Room` event told. Each row is
+//! window has, or all; and after it further chunks, also while the job runs, up to the word that `room` of the status or the last `Room` event reported. Each row is
 //! checked when it is complete: its digest, then its records. `room` and `received` of the status only grow, so no loss of an event matters, and a host that connects
 //! anew goes on at `received`. A start after the first rows were overwritten is refused: the job has to be loaded again.
 //!

@@ -145,7 +145,7 @@ fn jobs_are_kept_replaced_and_deleted() {
     let mut store = JobStore::open(store.into_flash());
     assert!(store.room() >= 60 * 3);
     assert!(kept(&mut store).is_empty());
-    // More words than there is room for, and fewer than were told.
+    // More words than there is room for, and fewer than were announced.
     assert_eq!(store.begin(&job("long", &words(0, 800))), Err(StorageError));
     store.begin(&job("short", &one)).unwrap();
     store.write(&two[..CHUNK]).unwrap();

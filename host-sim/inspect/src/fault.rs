@@ -99,9 +99,9 @@ mod tests {
     use crate::run::time_run;
     use machine::prepare::prepare;
 
-    /// The second pass is planned while the tool is on the first: its place was told as that of the tool, u = 0, v = 0.
+    /// The second pass is planned while the tool is on the first: its place was reported as that of the tool, u = 0, v = 0.
     #[test]
-    fn a_ball_that_does_not_fit_ahead_is_told_there() {
+    fn a_ball_that_does_not_fit_ahead_is_reported_there() {
         let text = r#"
 [surface]
 kind = "bicubic"

@@ -82,7 +82,7 @@ pub(super) fn marks(job: &Job, reach: &ReachResult) -> Vec<Mark> {
             "{} {:.3} mm in {}",
             finding.part.name(),
             finding.depth_mm,
-            finding.told(job)
+            finding.describe(job)
         ),
         place_mm: finding.place_mm,
         tick: Some(finding.sample as u64),
@@ -126,7 +126,7 @@ pub(super) fn print(job: &Job, reach: &ReachResult) {
     }
     for finding in &reach.findings {
         let name = format!("reach: {}", finding.part.name());
-        let obstacle = finding.told(job);
+        let obstacle = finding.describe(job);
         let [x, y, z] = finding.place_mm.to_array();
         let place = format!("x = {x:.3}, y = {y:.3}, z = {z:.3}, tick {}", finding.sample);
         let error = finding.bound_mm - finding.depth_mm;

@@ -365,7 +365,7 @@ fn peaks(axes: &Peaks) {
             Some(share) => {
                 let figure = format!("{:.1} % of its limit", 100.0 * share);
                 let error = 100.0 * peak.uncertainty;
-                let told = if peak.verdict == Verdict::Unknown {
+                let reported = if peak.verdict == Verdict::Unknown {
                     format!(
                         "cannot tell: at least {figure}, but over {:.3} ms",
                         1e3 * peak.base_s
@@ -373,7 +373,7 @@ fn peaks(axes: &Peaks) {
                 } else {
                     format!("{figure}{}", bases(peak, error))
                 };
-                (mark(peak.verdict), told)
+                (mark(peak.verdict), reported)
             }
         };
         say!(

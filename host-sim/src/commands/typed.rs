@@ -94,7 +94,7 @@ impl Operator for Console {
         self.say(&format!("paused: {cause}"));
     }
 
-    fn told(&mut self, _: &Request, came: Result<Status, RemoteError>) {
+    fn replied(&mut self, _: &Request, came: Result<Status, RemoteError>) {
         match came {
             Ok(status) => {
                 let percent = status.safety.feed_override;

@@ -233,11 +233,11 @@ fn faults_come_as_explained() {
         let lines = [line("radius_mm"), line("feed_mm_min")];
         let output = run(folder.path(), "simulate job.toml --json");
         assert_eq!(output.status.code(), Some(1), "{job}: {}", err(&output));
-        let told: Value = serde_json::from_slice(&output.stdout).unwrap();
+        let reported: Value = serde_json::from_slice(&output.stdout).unwrap();
         assert_eq!(
-            (&told["fault"]["code"], &told["fault"]["name"]),
+            (&reported["fault"]["code"], &reported["fault"]["name"]),
             (&code.into(), &name.into()),
-            "{told}"
+            "{reported}"
         );
         let hint = format!("cargo sim explain {code}");
         assert!(err(&output).contains(&hint), "{}", err(&output));
@@ -249,10 +249,10 @@ fn faults_come_as_explained() {
         let explained = json(folder.path(), &format!("explain {code} --json"));
         assert_eq!(explained["name"], name);
         if code == 1 {
-            assert_eq!(told["fault"]["tick"], 0);
+            assert_eq!(reported["fault"]["tick"], 0);
             assert!(
-                (told["fault"]["value"].as_f64().unwrap() - 1.125).abs() < 1e-4,
-                "{told}"
+                (reported["fault"]["value"].as_f64().unwrap() - 1.125).abs() < 1e-4,
+                "{reported}"
             );
         }
     }
@@ -284,8 +284,8 @@ fn faults_of_a_new_job_come_as_explained() {
         std::fs::write(&job, text).unwrap();
         let output = run(folder.path(), "simulate job.toml --json");
         assert_eq!(output.status.code(), Some(1), "{}", err(&output));
-        let told: Value = serde_json::from_slice(&output.stdout).unwrap();
-        assert_eq!(told["fault"]["code"], code, "{told}");
+        let reported: Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!(reported["fault"]["code"], code, "{reported}");
     }
 }
 
@@ -293,8 +293,8 @@ fn faults_of_a_new_job_come_as_explained() {
 fn a_placed_job_runs_and_its_errors_point_at_the_line() {
     let placed = "[placement]\nscale = 0.5\nrotate_deg = [0, 0, 90]\nplace = \"top\"\ntranslate_mm = [100, 50, -3]\n\n[tool]";
     let folder = folder_with("plate", &[("[tool]", placed)]);
-    let told = json(folder.path(), "verify job.toml --json");
-    assert_eq!(told["passed"], true, "{told}");
+    let reported = json(folder.path(), "verify job.toml --json");
+    assert_eq!(reported["passed"], true, "{reported}");
     let far = placed.replace("100,", "2200,");
     let folder = folder_with("plate", &[("[tool]", &far)]);
     let output = run(folder.path(), "simulate job.toml");

@@ -11,15 +11,19 @@ fn new_jobs_run_and_are_never_lost() {
     for kind in ["bicubic", "ruled", "revolved", "nurbs"] {
         let output = run(folder.path(), &format!("new -o {kind}.toml --kind {kind}"));
         assert_eq!(output.status.code(), Some(0), "{}", err(&output));
-        let told = json(folder.path(), &format!("simulate {kind}.toml --json"));
+        let reported = json(folder.path(), &format!("simulate {kind}.toml --json"));
         assert!(
-            told["fault"].is_null() && told["samples"].as_u64().unwrap() > 10_000,
-            "{told}"
+            reported["fault"].is_null() && reported["samples"].as_u64().unwrap() > 10_000,
+            "{reported}"
         );
-        let auto = &told["along_auto"];
+        let auto = &reported["along_auto"];
         let time = |along: &str| auto[along]["machining_time_s"].as_f64().unwrap();
         let least = time("u").min(time("v"));
-        assert_eq!(told["machining_time_s"].as_f64(), Some(least), "{kind}: {auto}");
+        assert_eq!(
+            reported["machining_time_s"].as_f64(),
+            Some(least),
+            "{kind}: {auto}"
+        );
     }
     let mine = folder.path().join("job.toml");
     std::fs::write(&mine, "# mine").unwrap();

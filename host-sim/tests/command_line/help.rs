@@ -68,7 +68,7 @@ fn bash_completes_cargo_sim() {
         .current_dir(folder.path())
         .output()
         .unwrap();
-    let told = out(&output);
+    let reported = out(&output);
     let wanted = [
         "verify",
         "budget",
@@ -83,5 +83,5 @@ fn bash_completes_cargo_sim() {
         "before:cargo:si:cargo",
         "before:cargo:--rel:build",
     ];
-    assert_eq!(told.lines().collect::<Vec<_>>(), wanted, "{}", err(&output));
+    assert_eq!(reported.lines().collect::<Vec<_>>(), wanted, "{}", err(&output));
 }

@@ -5,12 +5,12 @@ use serde_json::Value;
 use super::{err, folder_with, json, run};
 
 /// JSON keys and types of the contract: `n` number, `n?` number or null (no interval before the first sample), `s` text, `o?` object or null, `o` object, `b` true or false.
-fn has(told: &Value, names: &str, of: &str) {
+fn has(reported: &Value, names: &str, of: &str) {
     for name in names.split_whitespace() {
         let (key, kind) = name.split_once(':').unwrap();
-        let value = told
+        let value = reported
             .get(key)
-            .unwrap_or_else(|| panic!("{of}: no {key} in {told}"));
+            .unwrap_or_else(|| panic!("{of}: no {key} in {reported}"));
         let fits = match kind {
             "n" => value.is_number(),
             "n?" => value.is_number() || value.is_null(),
@@ -38,21 +38,21 @@ fn json_has_the_names_that_scripts_rely_on() {
     const EXPLAIN: &str = "family:s code:n label:s name:s meaning:s value:s why:s remedy:s example:s";
     let folder = folder_with("torus", &[("along = \"u\"", "along = \"auto\"")]);
     for approach in ["constant-cl", "linear", "curve", "surface"] {
-        let told = json(
+        let reported = json(
             folder.path(),
             &format!("simulate job.toml --approach {approach} --json"),
         );
-        has(&told, SIMULATE, approach);
-        assert_eq!(told["approach"], approach);
+        has(&reported, SIMULATE, approach);
+        assert_eq!(reported["approach"], approach);
         has(
-            &told["along_auto"]["u"],
+            &reported["along_auto"]["u"],
             "ticks:n machining_time_s:n",
             "along_auto",
         );
     }
     has(&json(folder.path(), "verify job.toml --json"), VERIFY, "verify");
-    let told = json(folder.path(), "export job.toml --format grbl -o x.nc --json");
-    has(&told, EXPORT, "export");
+    let reported = json(folder.path(), "export job.toml --format grbl -o x.nc --json");
+    has(&reported, EXPORT, "export");
     has(&json(folder.path(), "explain R1 --json"), EXPLAIN, "explain");
     assert_eq!(
         json(folder.path(), "explain --json").as_array().unwrap().len(),
@@ -61,9 +61,9 @@ fn json_has_the_names_that_scripts_rely_on() {
     has(&json(folder.path(), "new -o n.toml --json"), "job:s", "new");
     let bad = folder_with("torus", &[("radius_mm = 5", "radius_mm = 9")]);
     let output = run(bad.path(), "simulate job.toml --json");
-    let told: Value = serde_json::from_slice(&output.stdout).unwrap();
-    has(&told, SIMULATE, "a fault");
-    has(&told["fault"], FAULT, "fault");
+    let reported: Value = serde_json::from_slice(&output.stdout).unwrap();
+    has(&reported, SIMULATE, "a fault");
+    has(&reported["fault"], FAULT, "fault");
 }
 
 /// Checks a value against the part of JSON Schema that `docs/verify.schema.json` uses. Returns what does not fit.
@@ -147,10 +147,14 @@ fn verify_prints_an_object_of_the_schema_for_every_outcome() {
     ] {
         let output = run(folder.path(), arguments);
         assert_eq!(output.status.code(), Some(code), "{arguments}: {}", err(&output));
-        let told: Value =
+        let reported: Value =
             serde_json::from_slice(&output.stdout).unwrap_or_else(|error| panic!("{arguments}: {error}"));
-        assert_eq!(misfits_of(&told, definition), Vec::<String>::new(), "{arguments}");
-        for job in told["jobs"].as_array().into_iter().flatten() {
+        assert_eq!(
+            misfits_of(&reported, definition),
+            Vec::<String>::new(),
+            "{arguments}"
+        );
+        for job in reported["jobs"].as_array().into_iter().flatten() {
             let definition = if job.get("error").is_some() {
                 "error"
             } else {
@@ -164,17 +168,18 @@ fn verify_prints_an_object_of_the_schema_for_every_outcome() {
             assert_eq!(off, Vec::<String>::new(), "{arguments}");
         }
         assert_eq!(
-            told["passed"].as_bool().unwrap_or(false),
+            reported["passed"].as_bool().unwrap_or(false),
             code == 0,
             "{arguments}"
         );
     }
-    let told: Value = serde_json::from_slice(&run(folder.path(), "verify line.toml --json").stdout).unwrap();
+    let reported: Value =
+        serde_json::from_slice(&run(folder.path(), "verify line.toml --json").stdout).unwrap();
     let line = torus
         .lines()
         .position(|line| line.starts_with("feed_mm_min"))
         .unwrap()
         + 1;
-    assert_eq!(told["error"]["line"], line, "{told}");
-    assert!(told["error"]["help"].as_str().unwrap().contains("600"));
+    assert_eq!(reported["error"]["line"], line, "{reported}");
+    assert!(reported["error"]["help"].as_str().unwrap().contains("600"));
 }

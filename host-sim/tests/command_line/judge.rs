@@ -13,20 +13,23 @@ fn judge_takes_samples_and_agrees_with_verify() {
             .status
             .success()
     );
-    let told = json(folder.path(), "judge job.toml own.csv --json --report page");
+    let reported = json(folder.path(), "judge job.toml own.csv --json --report page");
     let page = std::fs::read_to_string(folder.path().join("page/index.html")).unwrap();
     assert!(page.contains("Judged: given, and this core") && page.contains("own.csv on the job"));
-    assert_eq!(told["given"]["reach"]["verdict"], "met");
-    assert_eq!(told["given"]["reach"]["contact"]["above_equator"], 0);
+    assert_eq!(reported["given"]["reach"]["verdict"], "met");
+    assert_eq!(reported["given"]["reach"]["contact"]["above_equator"], 0);
     let verified = json(folder.path(), "verify job.toml --json");
     let number = |value: &Value| value.as_f64().unwrap();
-    assert_eq!(told["passed"], true, "{told}");
-    assert_eq!(told["given"], told["core"], "the same motion");
-    assert_eq!(told["core_fault"], Value::Null);
-    let [theirs, ours] = [&told["given"], &verified].map(|of| number(&of["scallop_max_mm"]));
+    assert_eq!(reported["passed"], true, "{reported}");
+    assert_eq!(reported["given"], reported["core"], "the same motion");
+    assert_eq!(reported["core_fault"], Value::Null);
+    let [theirs, ours] = [&reported["given"], &verified].map(|of| number(&of["scallop_max_mm"]));
     assert!((theirs / ours - 1.0).abs() < 2e-3, "{theirs} and {ours}");
-    assert!(number(&told["given"]["path_error_max_mm"]) < 10e-6, "{told}");
-    assert!(number(&told["given"]["ripple_rms_pct"]) < 0.02, "{told}");
+    assert!(
+        number(&reported["given"]["path_error_max_mm"]) < 10e-6,
+        "{reported}"
+    );
+    assert!(number(&reported["given"]["ripple_rms_pct"]) < 0.02, "{reported}");
     let trace = std::fs::read_to_string(folder.path().join("own.csv")).unwrap();
     let mut table = "t_s,x_mm,y_mm,z_mm\n".to_owned();
     for line in trace.lines().skip(1) {
@@ -37,13 +40,13 @@ fn judge_takes_samples_and_agrees_with_verify() {
     std::fs::write(folder.path().join("tip.csv"), &table).unwrap();
     let output = run(folder.path(), "judge job.toml tip.csv --tip --alone --json");
     assert_eq!(output.status.code(), Some(1), "{}", err(&output));
-    let told: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let reported: Value = serde_json::from_slice(&output.stdout).unwrap();
     // The ball sits in the groove, so a lift moves it off the bottom by all of it, and nearer to neither flank.
     assert!(
-        (number(&told["given"]["path_error_max_mm"]) - 0.004).abs() < 5e-5,
-        "{told}"
+        (number(&reported["given"]["path_error_max_mm"]) - 0.004).abs() < 5e-5,
+        "{reported}"
     );
-    assert!(told["core"].is_null() && told["core_fault"].is_null());
+    assert!(reported["core"].is_null() && reported["core_fault"].is_null());
     for (text, wanted) in [
         ("t_s,x,y,z\n0,1,2,3\n", ":1: the columns"),
         (
@@ -60,10 +63,10 @@ fn judge_takes_samples_and_agrees_with_verify() {
         std::fs::write(folder.path().join("bad.csv"), text).unwrap();
         let output = run(folder.path(), "judge job.toml bad.csv --json");
         assert_eq!(output.status.code(), Some(2), "{text}");
-        let told: Value = serde_json::from_slice(&output.stdout).unwrap();
+        let reported: Value = serde_json::from_slice(&output.stdout).unwrap();
         assert!(
-            told["error"]["message"].as_str().unwrap().contains(wanted),
-            "{told}"
+            reported["error"]["message"].as_str().unwrap().contains(wanted),
+            "{reported}"
         );
     }
 }
@@ -78,14 +81,14 @@ fn judge_takes_programs() {
         folder.path(),
         "judge job.toml part.ngc --alone --json --path-tolerance 0.0052",
     );
-    let told: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let reported: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert!(
-        told.get("given").is_some(),
-        "LinuxCNC's rs274 is needed, as scripts/setup.sh brings it: {told}"
+        reported.get("given").is_some(),
+        "LinuxCNC's rs274 is needed, as scripts/setup.sh brings it: {reported}"
     );
-    let error = told["given"]["path_error_max_mm"].as_f64().unwrap();
+    let error = reported["given"]["path_error_max_mm"].as_f64().unwrap();
     assert!(error > 0.002 && error <= 0.0052, "{error}");
-    let [least, mean] = ["min", "mean"].map(|key| told["given"]["feed_mm_s"][key].as_f64().unwrap());
+    let [least, mean] = ["min", "mean"].map(|key| reported["given"]["feed_mm_s"][key].as_f64().unwrap());
     assert!(least < mean && (mean - 10.0).abs() < 0.1, "{mean}");
     std::fs::write(folder.path().join("bad.ngc"), "G1 X1 Y2 F0 Q\n").unwrap();
     let refused = run(folder.path(), "judge job.toml bad.ngc --json");
@@ -122,11 +125,11 @@ fn judge_refuses_programs_with_offsets() {
         std::fs::write(folder.path().join("posted.ngc"), text).unwrap();
         let output = run(folder.path(), "judge job.toml posted.ngc --json");
         assert_eq!(output.status.code(), Some(2), "{text}: {}", out(&output));
-        let told: Value = serde_json::from_slice(&output.stdout).unwrap();
-        let [message, help] = ["message", "help"].map(|key| told["error"][key].as_str().unwrap());
+        let reported: Value = serde_json::from_slice(&output.stdout).unwrap();
+        let [message, help] = ["message", "help"].map(|key| reported["error"][key].as_str().unwrap());
         assert!(
             message.contains(call) && help.contains(remedy),
-            "LinuxCNC's rs274 is needed, as scripts/setup.sh brings it: {told}"
+            "LinuxCNC's rs274 is needed, as scripts/setup.sh brings it: {reported}"
         );
     }
 }
@@ -147,8 +150,8 @@ fn judge_tells_of_a_fault_of_the_core() {
     )
     .unwrap();
     let output = run(folder.path(), "judge job.toml own.csv --json");
-    let told: Value = serde_json::from_slice(&output.stdout).unwrap();
-    assert_eq!(told["core_fault"]["name"], "ball-does-not-fit", "{told}");
+    let reported: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(reported["core_fault"]["name"], "ball-does-not-fit", "{reported}");
     let text = out(&run(folder.path(), "judge job.toml own.csv"));
     assert!(
         text.contains("this core stopped before the end of the job: "),

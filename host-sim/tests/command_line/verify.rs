@@ -15,13 +15,13 @@ fn remedies_for_a_scallop_help() {
     );
     let folder = folder_with("torus", &[first_order]);
     let output = run(folder.path(), "verify job.toml");
-    let told = out(&output);
-    assert_eq!(output.status.code(), Some(1), "{told}");
+    let reported = out(&output);
+    assert_eq!(output.status.code(), Some(1), "{reported}");
     let after = |what: &str| {
-        let rest = told
+        let rest = reported
             .split(what)
             .nth(1)
-            .unwrap_or_else(|| panic!("no {what} in {told}"));
+            .unwrap_or_else(|| panic!("no {what} in {reported}"));
         rest.split([',', '\n']).next().unwrap().trim().to_owned()
     };
     let tolerance = after("--scallop-tolerance ");
@@ -54,10 +54,10 @@ fn a_run_without_a_sample_meets_nothing() {
             .unwrap()
             .contains(&"gouge_max_mm".into())
     );
-    let told = out(&run(folder.path(), "verify job.toml"));
+    let reported = out(&run(folder.path(), "verify job.toml"));
     assert!(
-        told.contains("not measured: the run has no sample") && !told.contains("none deeper"),
-        "{told}"
+        reported.contains("not measured: the run has no sample") && !reported.contains("none deeper"),
+        "{reported}"
     );
 }
 
@@ -80,35 +80,35 @@ fn verify_tells_what_the_tool_does_not_reach() {
         serde_json::from_slice(&output.stdout).unwrap()
     };
     write(&job("[100, 0, 20]", "", ""));
-    let told = verify(1);
-    let (contact, parts) = (&told["reach"]["contact"], &told["reach"]["parts"]);
+    let reported = verify(1);
+    let (contact, parts) = (&reported["reach"]["contact"], &reported["reach"]["parts"]);
     assert_eq!(contact["verdict"], "violated");
     let height = contact["height_max_mm"].as_f64().unwrap();
     assert!(
         (height - 3.0 * 10.0_f64.to_radians().sin()).abs() < 1e-5,
         "{height}"
     );
-    assert_eq!(told["reach"]["undercut_share"], 1.0);
+    assert_eq!(reported["reach"]["undercut_share"], 1.0);
     assert_eq!(
         (&parts[0]["part"], &parts[0]["verdict"]),
         (&"shank".into(), &"violated".into())
     );
-    let failures = told["failures"].to_string();
+    let failures = reported["failures"].to_string();
     assert!(
         failures.contains("above its equator") && failures.contains("rotate_deg"),
         "{failures}"
     );
-    write(&job(&told["reach"]["rotate_deg"].to_string(), "", ""));
-    let told = verify(0);
-    assert_eq!(told["reach"]["verdict"], "met");
-    assert_eq!(told["reach"]["undercut_share"], 0.0);
-    assert!(told["reach"]["contact"]["height_max_mm"].as_f64().unwrap() < -2.5);
+    write(&job(&reported["reach"]["rotate_deg"].to_string(), "", ""));
+    let reported = verify(0);
+    assert_eq!(reported["reach"]["verdict"], "met");
+    assert_eq!(reported["reach"]["undercut_share"], 0.0);
+    assert!(reported["reach"]["contact"]["height_max_mm"].as_f64().unwrap() < -2.5);
     // Flat: the holder's face is 30 mm above the tip, 20 mm wide, beside a fixture that is 31 mm high: 5 mm from the outermost axis.
     let tool = "length_mm = 30\nholder = { diameter_mm = 20, length_mm = 40 }";
     let fixture = "[[fixture]]\nname = \"jaw\"\nbox_mm = [[25, 40], [0, 12], [-5, 31]]\n[stock]\nbox_mm = [[-5, 25], [-5, 17], [-5, 2]]\n";
     write(&job("[0, 0, 0]", tool, fixture));
-    let told = verify(1);
-    let hit = told["reach"]["parts"]
+    let reported = verify(1);
+    let hit = reported["reach"]["parts"]
         .as_array()
         .unwrap()
         .iter()
@@ -120,7 +120,7 @@ fn verify_tells_what_the_tool_does_not_reach() {
     );
     let depth = hit["depth_mm"].as_f64().unwrap();
     assert!((depth - 1.0).abs() < 1e-3, "{depth}");
-    assert_eq!(misfits_of(&told, "verification"), Vec::<String>::new());
+    assert_eq!(misfits_of(&reported, "verification"), Vec::<String>::new());
     let text = run(folder.path(), "verify job.toml --report out");
     let text = String::from_utf8_lossy(&text.stdout).into_owned();
     assert!(

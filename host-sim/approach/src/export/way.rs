@@ -145,7 +145,7 @@ fn check_start(job: &Job, safe_z_mm: f64) -> Result<(), JobError> {
                 format!(
                     "{} reaches z = {top_mm} mm, and the ball's lowest point is at {:.3} mm on traverses: the exported program begins where the tool \
                      stands, so its way to the first pass is not known",
-                    obstacle.told(job),
+                    obstacle.describe(job),
                     safe_z_mm - job.radius_mm
                 ),
                 format!(
@@ -179,7 +179,7 @@ fn in_the_way(job: &Job, finding: &ReachFinding) -> JobError {
         format!(
             "the {} {how} {} at x = {x:.3}, y = {y:.3}, z = {z:.3} where the exported program moves the ball's centre to x = {cx:.3}, y = {cy:.3}, z = {cz:.3}",
             finding.part.name(),
-            finding.obstacle.told(job)
+            finding.obstacle.describe(job)
         ),
         finding.remedy(),
     )

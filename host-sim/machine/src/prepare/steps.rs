@@ -68,12 +68,12 @@ mod tests {
             heartbeat_timeout_ms: 500.1,
             ..MachineSpec::default()
         };
-        let told = configuration(&machine);
+        let reported = configuration(&machine);
         assert_eq!(
-            (told.homing_required, told.on_link_timeout),
+            (reported.homing_required, reported.on_link_timeout),
             (false, LinkTimeoutAction::Hold)
         );
-        assert_eq!(told.link_timeout_ticks, 1251);
+        assert_eq!(reported.link_timeout_ticks, 1251);
         assert_eq!(configuration(&MachineSpec::default()).link_timeout_ticks, 1000);
     }
 

@@ -44,7 +44,7 @@ pub(super) struct Received {
     next: u32,
     /// Events that came before an earlier one.
     held: BTreeMap<u32, Vec<Event>>,
-    /// Number of the board's last event, as its last status told.
+    /// Number of the board's last event, as its last status reported.
     announced: u32,
     /// Count of the last end that was delivered, or that was before the session or the run; none before the first status.
     halts: Option<u32>,
@@ -85,7 +85,7 @@ impl Received {
         }
     }
 
-    /// A status told the number of the board's last event.
+    /// A status reported the number of the board's last event.
     pub(super) fn announce(&mut self, last: u32) {
         self.announced = self.announced.max(last);
     }
@@ -151,7 +151,7 @@ impl Received {
         self.ready.clear();
     }
 
-    /// The next event. An end that is over already, because a status told it, is passed over.
+    /// The next event. An end that is over already, because a status reported it, is passed over.
     pub(super) fn pop(&mut self) -> Option<Event> {
         loop {
             let event = self.ready.pop_front()?;

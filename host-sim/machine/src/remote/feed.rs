@@ -9,7 +9,7 @@ use crate::prepare::Prepared;
 pub(super) struct Feed {
     pub(super) job: Prepared,
     offset: usize,
-    /// Words up to which the board has room, as far as it told.
+    /// Words up to which the board has room, as far as it reported.
     room: usize,
     /// Most words of a chunk.
     most: usize,
@@ -29,7 +29,7 @@ impl Feed {
         }
     }
 
-    /// The board told up to which word it has room: never less than before.
+    /// The board reported up to which word it has room: never less than before.
     pub(super) fn has_room(&mut self, room: u32) {
         self.room = self.room.max(room as usize);
     }

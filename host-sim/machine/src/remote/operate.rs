@@ -84,7 +84,7 @@ pub trait Operator {
     }
 
     /// The outcome of a command: the board's state after it, or the refusal.
-    fn told(&mut self, request: &Request, came: Result<Status, RemoteError>);
+    fn replied(&mut self, request: &Request, came: Result<Status, RemoteError>);
 }
 
 /// Follows a run, and forwards the commands of its operator.
@@ -137,7 +137,7 @@ impl<'a> Following<'a> {
                     if let Ok(status) = &came {
                         self.no_feed = status.safety.feed_override == 0;
                     }
-                    operator.told(&request, came);
+                    operator.replied(&request, came);
                 }
                 continue;
             }

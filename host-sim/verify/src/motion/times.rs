@@ -486,8 +486,11 @@ mod tests {
             times.links.iter().map(|link| link.turn).collect::<Vec<_>>(),
             [false, true, false]
         );
-        let told = warning(&times).unwrap();
-        assert!(told.contains("25 ms at tick 379, pass 0 (at the end"), "{told}");
+        let reported = warning(&times).unwrap();
+        assert!(
+            reported.contains("25 ms at tick 379, pass 0 (at the end"),
+            "{reported}"
+        );
     }
 
     #[test]

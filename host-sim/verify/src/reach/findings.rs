@@ -26,7 +26,7 @@ pub enum Obstacle {
 impl Obstacle {
     /// Its name in a sentence.
     #[must_use]
-    pub fn told(self, job: &Job) -> String {
+    pub fn describe(self, job: &Job) -> String {
         match self {
             Self::Fixture(_) => self.name(job),
             _ => format!("the {}", self.name(job)),
@@ -84,10 +84,10 @@ impl ReachFinding {
 
     /// The obstacle in a sentence; the ball is sought in the surface between passes only.
     #[must_use]
-    pub fn told(&self, job: &Job) -> String {
+    pub fn describe(&self, job: &Job) -> String {
         match (self.part, self.obstacle) {
             (ToolPart::Ball, Obstacle::Surface) => "the surface between passes".to_owned(),
-            (_, obstacle) => obstacle.told(job),
+            (_, obstacle) => obstacle.describe(job),
         }
     }
 
@@ -196,7 +196,7 @@ impl ReachResult {
 }
 
 fn sentence(job: &Job, finding: &ReachFinding) -> Option<String> {
-    let (part, obstacle) = (finding.part.name(), finding.told(job));
+    let (part, obstacle) = (finding.part.name(), finding.describe(job));
     let [x, y, z] = finding.place_mm.to_array();
     let at = format!("x = {x:.3}, y = {y:.3}, z = {z:.3}, at tick {}", finding.sample);
     match finding.verdict() {

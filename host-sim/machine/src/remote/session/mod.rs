@@ -45,7 +45,7 @@ pub struct Session {
     decoder: Decoder,
     number: u16,
     events: Received,
-    /// A status told an end whose event had not come.
+    /// A status reported an end whose event had not come.
     ending: Option<u32>,
     /// Requests so far for the event that is missing.
     repeats: u32,

@@ -98,7 +98,7 @@ impl Session {
         Ok(None)
     }
 
-    /// Whether to request the status: for the heartbeat, after some silence, or because the last one told an end.
+    /// Whether to request the status: for the heartbeat, after some silence, or because the last one reported an end.
     fn is_look_due(&self) -> bool {
         let look = if self.stream.is_process() {
             PROCESS_LOOK

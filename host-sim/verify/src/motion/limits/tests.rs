@@ -113,13 +113,13 @@ fn a_motion_at_its_limits_is_never_blamed() {
             }
             // The velocity is reached for 50 ms, longer than every base.
             assert!(peaks[0].share.unwrap() > 0.99, "{:?}", peaks[0]);
-            let told = peaks[2].verdict == Verdict::Met;
+            let reported = peaks[2].verdict == Verdict::Met;
             // The jerk has a verdict unless the acceleration's ramp is shorter than the base that the noise needs.
             assert!(
-                told || acceleration / jerk < 0.012,
+                reported || acceleration / jerk < 0.012,
                 "{jerk} {acceleration} {peaks:?}"
             );
-            assert!(peaks[2].uncertainty <= ERROR_SHARE || !told);
+            assert!(peaks[2].uncertainty <= ERROR_SHARE || !reported);
         }
     }
 }
@@ -196,10 +196,10 @@ fn where_no_base_can_it_says_so() {
     let shaken = |t: f64| 0.02 * (1.0 - (t * 60.0).cos());
     let peaks = peaks_of(&spec, shaken, 0.5, |tick| if tick % 2 == 0 { 9.0 } else { -9.0 });
     assert_eq!(peaks[2].verdict, Verdict::Unknown, "{peaks:?}");
-    let told = failures(&peaks).join("; ");
+    let reported = failures(&peaks).join("; ");
     assert!(
-        told.contains("cannot tell whether x keeps its jerk limit"),
-        "{told}"
+        reported.contains("cannot tell whether x keeps its jerk limit"),
+        "{reported}"
     );
     // At rest nothing is above anything, whatever the base.
     assert_eq!(peaks_of(&spec, |_| 0.0, 0.5, |_| 0.0)[2].verdict, Verdict::Met);

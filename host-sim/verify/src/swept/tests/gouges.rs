@@ -151,9 +151,9 @@ fn a_small_ball_on_a_large_plane_is_measured() {
     assert!(found.cells > 1_500_000, "{}", found.cells);
     // The sentence names the size of the surface where that is the cause.
     found.gouge_cells_exhausted = true;
-    let told = found.searching_remedy(&job);
+    let reported = found.searching_remedy(&job);
     assert!(
-        told.contains("too large for a ball of 0.1 mm") && !told.contains("hardly fits"),
-        "{told}"
+        reported.contains("too large for a ball of 0.1 mm") && !reported.contains("hardly fits"),
+        "{reported}"
     );
 }

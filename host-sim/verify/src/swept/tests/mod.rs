@@ -252,8 +252,11 @@ fn sphere_by_circles_around_its_pole() {
         let exact = sides.windows(2).map(height).fold(0.0, f64::max);
         if coarse {
             assert_eq!(found.scallop_verdict, Verdict::Unknown, "{found:?}");
-            let told = &found.failures[0];
-            assert!(told.contains("not measured") && told.contains("1 %"), "{told}");
+            let reported = &found.failures[0];
+            assert!(
+                reported.contains("not measured") && reported.contains("1 %"),
+                "{reported}"
+            );
             continue;
         }
         agrees(&found, exact);
