@@ -440,7 +440,7 @@ impl Operator for Scripted {
         self.stays
     }
 
-    fn describe(&mut self, _: &Request, came: Result<Status, RemoteError>) {
+    fn replied(&mut self, _: &Request, came: Result<Status, RemoteError>) {
         self.came
             .push(came.map(|status| status.state).map_err(|error| error.to_string()));
     }

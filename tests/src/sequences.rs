@@ -448,16 +448,16 @@ impl Trajectory {
         };
         let end = run.follow(steps);
         let (name, tick) = (&self.name, run.last.tick);
-        let reported = |what| {
+        let told = |what| {
             format!(
                 "{name} from tick {}, {steps:?}: {what}, tick {tick}",
                 start.sample.tick
             )
         };
-        end.map_err(reported)?;
+        end.map_err(told)?;
         run.outcome.worst = run.uses.worst;
         if !run.uses.are_permitted() {
-            return Err(reported(format!("{:?} of the limits", run.uses.worst)));
+            return Err(told(format!("{:?} of the limits", run.uses.worst)));
         }
         Ok(run.outcome)
     }

@@ -268,6 +268,7 @@ impl<'m> Translation<'m> {
                 Ok(surface) => surface,
                 Err(why) => {
                     model.warnings.push(format!("face {name} is left out: {why}"));
+                    model.left_out += homes.len();
                     continue;
                 }
             };
@@ -275,6 +276,12 @@ impl<'m> Translation<'m> {
             let boundary = match stated.boundaries(&name).filter(|count| *count != loops.len()) {
                 Some(count) => {
                     Boundary::Unknown(format!("{} of its {count} boundaries were read", loops.len()))
+                }
+                None if !loops.is_empty() && self.ends_with_surface(face.surface.as_str()) => {
+                    Boundary::Unknown(
+                        "its outer boundary is that of its surface, of which holes alone are given"
+                            .to_owned(),
+                    )
                 }
                 None => self.boundary(loops.into_iter()),
             };
@@ -312,6 +319,7 @@ impl<'m> Translation<'m> {
                     model
                         .warnings
                         .push(format!("face {name} is left out: its placement distorts it"));
+                    model.left_out += 1;
                     continue;
                 };
                 let turn = if home.mirrors() { -1.0 } else { 1.0 };
@@ -373,6 +381,9 @@ impl<'m> Translation<'m> {
                     colour: None,
                     boundary: match stated.owner(&name) {
                         Some(owner) => Boundary::Unknown(format!("it is of {owner}, which was not read")),
+                        None if self.is_part_of_surface(item.id.as_str()) => {
+                            Boundary::Unknown("it is a part of another surface".to_owned())
+                        }
                         None => Boundary::Natural,
                     },
                     entity: name,
@@ -495,6 +506,32 @@ impl<'m> Translation<'m> {
             .and_then(|index| self.source.surfaces.get(*index));
         let solved = item.and_then(|item| item.geometry.solved());
         matches!(solved, Some(SolvedSurfaceGeometry::Nurbs(nurbs)) if nurbs.normal_reversed())
+    }
+
+    /// Whether a face on this surface has the surface's own ends, and its loops are holes.
+    fn ends_with_surface(&self, id: &str) -> bool {
+        matches!(
+            self.definition(id),
+            Some(Made::CurveBounded {
+                implicit_outer: true,
+                ..
+            })
+        )
+    }
+
+    /// Whether a surface is a part of another one, whose parameters alone are known here.
+    fn is_part_of_surface(&self, id: &str) -> bool {
+        let made = self.definition(id);
+        matches!(
+            made,
+            Some(Made::CurveBounded { .. } | Made::Subset(_) | Made::SubSurface(_))
+        )
+    }
+
+    fn definition(&self, id: &str) -> Option<&Made> {
+        let index = self.constructions.get(id)?;
+        let made = self.source.procedural_surfaces.get(*index)?;
+        Some(made.definition())
     }
 
     /// A surface derived from curves or from another surface.

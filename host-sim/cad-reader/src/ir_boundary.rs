@@ -134,7 +134,7 @@ impl Translation<'_> {
             .windows(2)
             .map(|part| {
                 let point = |share: f64| curve.at(part[0] + (part[1] - part[0]) * share)[0];
-                let mut intervals = EDGE_INTERVALS;
+                let mut intervals = intervals(curve, [part[0], part[1]]);
                 let mut points = evenly(intervals, point);
                 while intervals < EDGE_INTERVALS_MAX {
                     let finer = evenly(2 * intervals, point);
@@ -155,6 +155,26 @@ impl Translation<'_> {
     }
 }
 
+/// Intervals of a part of an edge to begin with: two for each span of a spline, of which one may have a feature that the others do not show; they are compared with twice as many.
+fn intervals(curve: &Curve, [start, end]: [f64; 2]) -> usize {
+    let Curve::Spline(spline) = curve else {
+        return EDGE_INTERVALS;
+    };
+    let mut ends = spline.axis.breaks();
+    ends.retain(|knot| *knot > start && *knot < end);
+    ends.insert(0, start);
+    ends.push(end);
+    let shortest = ends
+        .windows(2)
+        .map(|span| span[1] - span[0])
+        .fold(end - start, f64::min);
+    let mut intervals = EDGE_INTERVALS;
+    while intervals < EDGE_INTERVALS_MAX && (intervals as f64) * shortest < 2.0 * (end - start) {
+        intervals *= 2;
+    }
+    intervals
+}
+
 /// Points at equal steps of the share of an edge, its ends included.
 fn evenly(intervals: usize, point: impl Fn(f64) -> DVec3) -> Edge {
     (0..=intervals)
@@ -173,4 +193,30 @@ fn gap_mm(edges: &[Edge]) -> Option<f64> {
             _ => f64::NAN,
         });
     gaps.reduce(|most, gap| if gap > most || gap.is_nan() { gap } else { most })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use cad::{Axis, SplineCurve};
+
+    /// An edge of many spans has points in each of them.
+    #[test]
+    fn every_span_of_an_edge_has_points() {
+        for spans in [1_u32, 7, 40, 200] {
+            let mut knots = vec![0.0; 3];
+            knots.extend((0..=spans).map(f64::from));
+            knots.extend([f64::from(spans); 3]);
+            let count = spans as usize + 3;
+            let curve = Curve::Spline(SplineCurve {
+                axis: Axis { degree: 3, knots },
+                poles: vec![[0.0, 0.0, 0.0, 1.0]; count],
+            });
+            let found = intervals(&curve, [0.0, f64::from(spans)]);
+            assert!(
+                found >= 2 * spans as usize && found >= EDGE_INTERVALS && found <= 1024,
+                "{found} of {spans}"
+            );
+        }
+    }
 }

@@ -12,6 +12,8 @@ const KNOT_MM: f64 = 1e-4;
 const POLE_MM: f64 = 1e-3;
 /// Two parameters are opposite to one another if they are half a period apart within this share of it.
 const OPPOSITE: f64 = 1e-6;
+/// Two loops around a surface are at the same place within this share of a period.
+const SAME: f64 = 1e-9;
 /// A loop goes straight back from a pole if it leaves it within this share of the period of where it came from.
 const BACK: f64 = 1e-6;
 /// Largest difference between the area of a loop of iso-parametric lines and that of its bounding rectangle, as a share: an
@@ -97,14 +99,45 @@ pub(super) fn paths(on: &Periodic<'_>, loops: &[Vec<Edge>], sense: f64) -> Vec<P
         for (index, path) in paths.iter_mut().enumerate() {
             let turns = ((home - middle(path, k)) / period).round();
             if index != largest && path.winding[k] == 0.0 && turns != 0.0 {
-                path.edges
-                    .iter_mut()
-                    .flatten()
-                    .for_each(|place| place[k] += turns * period);
+                path.shift(k, turns * period);
             }
         }
     }
+    in_order(on, &mut paths, sense);
     paths
+}
+
+/// Of two loops around a surface that is closed both ways, the face is between that which has it on its upper side and the next of the other: maybe more than half of the
+/// surface. The upper one is moved there by whole periods, and the others into this range.
+fn in_order(on: &Periodic<'_>, paths: &mut [Path], sense: f64) {
+    for k in 0..2 {
+        let across = 1 - k;
+        let (Some(_), Some(period)) = (on.periods[k], on.periods[across]) else {
+            continue;
+        };
+        let above = |path: &Path| path.winding[k] * sense * if k == 0 { 1.0 } else { -1.0 };
+        let rings: Vec<usize> = (0..paths.len())
+            .filter(|index| paths[*index].winding[k] != 0.0 && paths[*index].winding[across] == 0.0)
+            .collect();
+        let [one, other] = rings[..] else { continue };
+        let (lower, upper) = match [one, other].map(|index| above(&paths[index]) > 0.0) {
+            [true, false] => (one, other),
+            [false, true] => (other, one),
+            _ => continue,
+        };
+        let middle = |path: &Path| path.extent(across).iter().sum::<f64>() * 0.5;
+        let from = middle(&paths[lower]);
+        for (index, path) in paths.iter_mut().enumerate() {
+            let apart = middle(path) - from;
+            let mut way = apart.rem_euclid(period);
+            if index == upper && way < SAME * period {
+                way += period;
+            }
+            if index != lower && path.winding[across] == 0.0 {
+                path.shift(across, way - apart);
+            }
+        }
+    }
 }
 
 /// Whether the loops of a face on a closed surface are its holes alone: the face is on the outer side of the largest.
@@ -119,6 +152,11 @@ pub(super) fn complementary(on: &Periodic<'_>, paths: &[Path], sense: f64) -> bo
 }
 
 impl Path {
+    fn shift(&mut self, k: usize, by: f64) {
+        let places = self.edges.iter_mut().flatten();
+        places.for_each(|place| place[k] += by);
+    }
+
     fn extent(&self, k: usize) -> [f64; 2] {
         let values = self.edges.iter().flatten().map(|place| place[k]);
         values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| {
@@ -152,6 +190,21 @@ fn speed(on: &Periodic<'_>, place: [f64; 2], k: usize) -> f64 {
 fn reach(on: &Periodic<'_>, k: usize) -> f64 {
     let range = on.domain[k].map_or(1.0, |[low, high]| high - low);
     on.periods[k].unwrap_or(range)
+}
+
+/// Whether the line of the parameter k through a place is one point: not where the parameter is only slow there.
+fn is_pole(on: &Periodic<'_>, place: [f64; 2], k: usize) -> bool {
+    if speed(on, place, k) * reach(on, k) >= POLE_MM {
+        return false;
+    }
+    let [low, high] = on.domain[k].unwrap_or([place[k] - 1.0, place[k] + 1.0]);
+    let point = |at: f64| {
+        let mut line = place;
+        line[k] = at;
+        on.at(line[0], line[1]).point
+    };
+    let here = point(place[k]);
+    (0..=4).all(|part| here.distance(point(low + (high - low) * f64::from(part) / 4.0)) < POLE_MM)
 }
 
 /// A loop in parameters. `sense`: 1 if the face's normal is along S_u x S_v, -1 against it; the face is to the left of its loops.
@@ -238,7 +291,7 @@ fn traced(on: &Periodic<'_>, edges: &[Edge], sense: f64) -> (Path, bool) {
         for point in edge {
             let (mut place, off_mm) = on.invert(*point, near);
             path.off_mm = path.off_mm.max(off_mm);
-            let on_pole = [0, 1].map(|k| speed(on, place, k) * reach(on, k) < POLE_MM);
+            let on_pole = [0, 1].map(|k| is_pole(on, place, k));
             let raw = place;
             for k in 0..2 {
                 let turning = &mut turnings[k];
@@ -422,7 +475,19 @@ fn single(on: &Periodic<'_>, paths: &[Path], rectangle: &mut [[f64; 2]; 2]) -> O
     }
     let [u, v] = *rectangle;
     let whole = (u[1] - u[0]) * (v[1] - v[0]);
-    if !whole_turn && (path.area().abs() - whole).abs() > AREA_SLACK * whole {
+    // A notch may be smaller than any share of the area.
+    let is_at_side = |edge: &Vec<[f64; 2]>| {
+        (0..2).any(|k| {
+            let fastest = edge.iter().map(|place| speed(on, *place, k)).fold(0.0, f64::max);
+            constant(on, edge, k)
+                && rectangle[k].iter().any(|side| {
+                    edge.iter()
+                        .all(|place| (place[k] - side).abs() * fastest <= 2.0 * FOLLOWS_MM)
+                })
+        })
+    };
+    let is_rectangle = path.edges.iter().all(is_at_side);
+    if !whole_turn && (!is_rectangle || (path.area().abs() - whole).abs() > AREA_SLACK * whole) {
         return Some("its boundary is no rectangle in the surface's parameters".to_owned());
     }
     None

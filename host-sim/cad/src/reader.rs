@@ -26,6 +26,9 @@ pub struct Model {
     /// Which of them bound a solid.
     #[serde(default)]
     pub solids: Vec<Solid>,
+    /// Number of faces that are left out, because their surfaces could not be read.
+    #[serde(default)]
+    pub left_out: usize,
     /// Entities that could not be read, as sentences.
     pub warnings: Vec<String>,
 }

@@ -17,6 +17,8 @@ use glam::DVec3;
 /// A closed polygon: vertices `[u, v]`, without a repeated last one.
 pub type Polygon = Vec<[f64; 2]>;
 
+/// A face narrower than this is none, mm.
+const NARROW_MM: f64 = 1e-6;
 /// Largest gap between the ends of a loop, mm.
 const GAP_MM: f64 = 0.05;
 /// Largest distance of a boundary from the face's surface, mm.
@@ -125,6 +127,9 @@ pub fn trim(
         )
         .into());
     }
+    if inside.iter().all(|polygon| is_without_area(on, polygon)) {
+        return Err("its boundary encloses no area".to_owned().into());
+    }
     let polygons = inside.iter().map(|polygon| {
         let fine = match &remap {
             Some(remap) => remap.polygon(on, polygon, 0.1 * tolerance_mm),
@@ -220,6 +225,18 @@ fn halved(
     let middle = between(0.5);
     halved(at, [a, middle], tolerance_mm, left - 1, points);
     halved(at, [middle, b], tolerance_mm, left - 1, points);
+}
+
+/// Whether a polygon goes there and back: of a surface that closes without the reader's knowledge, for example.
+fn is_without_area(on: &Periodic<'_>, polygon: &Polygon) -> bool {
+    let [su, sv] = metric(on, polygon);
+    let next = polygon.iter().cycle().skip(1);
+    let (mut area, mut length) = (0.0, 0.0_f64);
+    for (a, b) in polygon.iter().zip(next) {
+        area += 0.5 * (a[0] * b[1] - b[0] * a[1]) * su * sv;
+        length += ((b[0] - a[0]) * su).hypot((b[1] - a[1]) * sv);
+    }
+    area.abs() <= NARROW_MM * length
 }
 
 /// The corners of a rectangle.

@@ -324,6 +324,137 @@ fn sectors_end_at_a_pole() {
     }
 }
 
+/// Elbows of a tube whose rings have no seam between them, and sectors of a ring: of half a turn and more, too, the face is between the ring that has it above and the next one.
+#[test]
+fn elbows_of_more_than_half_a_turn() {
+    let (major, minor) = (20.0, 5.0);
+    let torus = Surface::Torus {
+        center: DVec3::ZERO,
+        x: DVec3::X,
+        y: DVec3::Y,
+        z: DVec3::Z,
+        major,
+        minor,
+    };
+    let ring = |k: usize, at: f64, turn: f64| {
+        let place = move |t: f64| if k == 0 { [t, at] } else { [at, t] };
+        vec![edge(&torus, move |share| place(0.3 + turn * TAU * share))]
+    };
+    for angle in [1.0, 3.0, PI, 3.3, 4.5, 6.0] {
+        for start in [0.0, 2.0, -1.0, 5.0] {
+            let end = start + angle;
+            // Along the ring; the tube's circles are in v.
+            let elbow = angle * TAU * major * minor;
+            // Around the tube; its circles are in u.
+            let strip = TAU * minor * (major * angle + minor * (end.sin() - start.sin()));
+            for (k, turn, wanted) in [(1, -1.0, elbow), (0, 1.0, strip)] {
+                for (sense, turn) in [(1.0, turn), (-1.0, -turn)] {
+                    let [lower, upper] = [ring(k, start, turn), ring(k, end, -turn)];
+                    is_area(
+                        &face(torus.clone(), vec![lower.clone(), upper.clone()], sense),
+                        wanted,
+                    );
+                    is_area(&face(torus.clone(), vec![upper, lower], sense), wanted);
+                }
+            }
+        }
+    }
+    // With a window.
+    let window = ellipse(&torus, [4.0, 1.0], [0.2, 0.3], -1.0);
+    let missing = PI * 0.2 * 0.3 * minor * (major + minor * 1.0_f64.cos());
+    let loops = vec![ring(1, 0.0, -1.0), ring(1, 4.5, 1.0), window];
+    is_area(
+        &face(torus.clone(), loops, 1.0),
+        4.5 * TAU * major * minor - missing,
+    );
+}
+
+/// Two rows of poles that coincide make a parameter slow, not undefined: the face goes to its side.
+#[test]
+fn a_slow_parameter_is_no_pole() {
+    use crate::spline::{Axis, SplineSurface};
+    let axis = |degree: usize| Axis {
+        degree,
+        knots: [vec![0.0; degree + 1], vec![1.0; degree + 1]].concat(),
+    };
+    let row = |x: f64| vec![[x, 0.0, 0.0, 1.0], [x, 30.0, 0.0, 1.0]];
+    let surface = Surface::Spline(SplineSurface {
+        axes: [axis(3), axis(1)],
+        poles: [0.0, 0.0, 50.0, 100.0].map(row).to_vec(),
+    });
+    let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+    let found = outline(&face(surface.clone(), vec![around(&surface, &corners)], 1.0)).unwrap();
+    assert_eq!(found.trimmed, None);
+    for [low, high] in found.rectangle {
+        assert!(
+            low.abs() < 1e-3 && (high - 1.0).abs() < 1e-3,
+            "{:?}",
+            found.rectangle
+        );
+    }
+}
+
+/// A surface that closes without being known to close: its boundary goes there and back, and encloses nothing. That is an error, not a face without a place.
+#[test]
+fn a_polygon_without_area_is_an_error() {
+    use crate::curve::Curve;
+    use crate::spline::{Axis, SplineCurve};
+    let poles = [
+        [10.0, 0.0],
+        [10.0, 10.0],
+        [-10.0, 10.0],
+        [-10.0, -10.0],
+        [10.0, -10.0],
+        [10.0, 0.0],
+    ];
+    let profile = Curve::Spline(SplineCurve {
+        axis: Axis {
+            degree: 3,
+            knots: vec![0.0, 0.0, 0.0, 0.0, 1.0, 2.0, 3.0, 3.0, 3.0, 3.0],
+        },
+        poles: poles.map(|[x, y]| [x, y, 0.0, 1.0]).to_vec(),
+    });
+    let surface = Surface::Extrusion {
+        profile,
+        range: Some([0.0, 3.0]),
+        direction: DVec3::Z,
+    };
+    let corners = [[0.0, 0.0], [3.0, 0.0], [3.0, 40.0], [0.0, 40.0]];
+    let face = face(surface.clone(), vec![around(&surface, &corners)], 1.0);
+    match outline(&face) {
+        Err(_) => {}
+        Ok(found) => match trim(&face, &found, None, TOLERANCE_MM) {
+            Err(error) => assert!(error.what.contains("no area"), "{}", error.what),
+            // Known to be closed: the whole of it.
+            Ok(polygons) => assert!(contains(&polygons, [1.5, 20.0])),
+        },
+    }
+}
+
+/// A notch is one, however large the face.
+#[test]
+fn small_notches_are_no_rounding() {
+    let plane = plane();
+    for notch in [0.05, 0.5, 3.0] {
+        let corners = [
+            [0.0, 0.0],
+            [400.0, 0.0],
+            [400.0, 400.0],
+            [notch, 400.0],
+            [notch, 400.0 - notch],
+            [0.0, 400.0 - notch],
+        ];
+        let face = face(plane.clone(), vec![around(&plane, &corners)], 1.0);
+        let outline = outline(&face).unwrap();
+        assert!(outline.trimmed.is_some(), "{notch}");
+        let polygons = trim(&face, &outline, None, TOLERANCE_MM).unwrap();
+        assert!(
+            !contains(&polygons, [0.4 * notch, 400.0 - 0.4 * notch]),
+            "{notch}"
+        );
+    }
+}
+
 /// A plane through the axis cuts a cap in one edge, on which the pole is a point among others or between two.
 #[test]
 fn edges_run_through_a_pole() {

@@ -51,6 +51,8 @@ pub struct Part {
     pub faces: Vec<PartFace>,
     /// The faces that are not known.
     pub missing: Vec<Missing>,
+    /// Number of faces of the file that have no surface here.
+    pub left_out: usize,
     cells: Vec<Cell>,
     cell_tree: Tree,
     edges: Vec<([DVec3; 2], u32)>,

@@ -77,7 +77,10 @@ pub fn check_run(
     };
     let asked = Asked::new(job, source)?;
     let request = asked.request();
-    let between: Vec<DVec3> = links_mm.iter().flat_map(|way| along(way)).collect();
+    let between: Vec<DVec3> = links_mm
+        .iter()
+        .flat_map(|way| along(way, job.radius_mm))
+        .collect();
     let deepest = asked
         .part()
         .map(|part| [&centres.centres, &between].map(|centres| deepest(part, asked.tool(), centres)));
@@ -92,7 +95,7 @@ pub fn check_run(
         deepest,
         counts: [centres.centres.len(), between.len()],
         tolerance_mm: request.touch_mm,
-        unknown: reach.unknown.len(),
+        unknown: reach.unknown.len() + asked.part().map_or(0, |part| part.left_out),
         leftover,
         tick,
         failures: Vec::new(),

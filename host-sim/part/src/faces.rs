@@ -16,7 +16,7 @@ use crate::region::{Made, Request};
 use crate::tool::{Reason, Tool};
 
 /// The method by which regions are made: others in a cache are not used.
-const METHOD: u32 = 13;
+const METHOD: u32 = 14;
 /// Folder beside the job in which regions are kept.
 const CACHE: &str = ".isofeed";
 /// How deep the tool may enter the part, mm, where no part says it: only the grid of a face alone depends on it.
@@ -161,7 +161,9 @@ pub fn placed_part(model: &Arc<Model>, by: &Placement) -> Arc<Part> {
         return Arc::clone(part);
     }
     let faces: Vec<cad::Face> = model.faces.iter().filter_map(|face| face.placed(by)).collect();
-    let part = Arc::new(Part::new(&faces));
+    let mut part = Part::new(&faces);
+    part.left_out = model.left_out + (model.faces.len() - faces.len());
+    let part = Arc::new(part);
     *lock() = Some((Arc::clone(model), by.rows, Arc::clone(&part)));
     part
 }
@@ -317,8 +319,9 @@ fn cache_file(job: &Job, source: &CadSource) -> Option<PathBuf> {
     };
     let part_rules = job.origin.part().map(|of| (of.tolerance_mm, of.steepest_deg));
     let rules = format!(
-        "{METHOD} {} {} {:?} {} {:?} {:?} {} {:?} {:?} {:?}",
+        "{METHOD} {} {} {} {:?} {} {:?} {:?} {} {:?} {:?} {:?}",
         source.face,
+        source.untrimmed,
         source.tolerance_mm,
         source.parameters,
         source.around_mm,

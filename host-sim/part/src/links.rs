@@ -20,7 +20,7 @@ use crate::tool::Tool;
 use job_file::FaceError;
 
 /// Number of the method by which links are made: cached links of another method are not used.
-const METHOD: u32 = 2;
+const METHOD: u32 = 3;
 /// Least height of a crossing above both ends of a link, mm.
 const LIFT_MM: f64 = 0.3;
 /// Precision of the height of a crossing, mm.

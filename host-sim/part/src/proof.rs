@@ -66,10 +66,12 @@ pub fn deepest(part: &Part, tool: &Tool, centres: &[DVec3]) -> Option<Deepest> {
 
 /// Places along a way, close enough that checking each one checks the way.
 #[must_use]
-pub fn along(way: &[DVec3]) -> Vec<DVec3> {
+pub fn along(way: &[DVec3], radius_mm: f64) -> Vec<DVec3> {
+    // Between two places a ball enters an edge deeper by step^2 / (8 r) than at them.
+    let step_mm = STEP_MM.min((8.0 * radius_mm * DISTANCE_ERROR_MM).sqrt());
     let mut places: Vec<DVec3> = way.first().copied().into_iter().collect();
     for ends in way.windows(2) {
-        let steps = (ends[0].distance(ends[1]) / STEP_MM).ceil().max(1.0);
+        let steps = (ends[0].distance(ends[1]) / step_mm).ceil().max(1.0);
         #[allow(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,

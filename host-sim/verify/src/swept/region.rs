@@ -27,8 +27,8 @@ const SPEED_LINES: u32 = 24;
 const SEARCHED_SHARE: f64 = 0.5;
 /// Share by which a place may be above the limit: how far it is from the boundary is taken by the metric at the place, and a place beyond half a step-over by 0.5 % of it is 1 % higher.
 const SERVED_SLACK: f64 = super::ERROR_SHARE_MAX;
-/// Share of a region above the limit beside its boundary that is worth a warning.
-const WORTH_SHARE: f64 = 1e-3;
+/// Height beside the boundary, in limits, that is worth a warning: on a slanted boundary it is about four, in a strip without a pass more.
+const USUAL: f64 = 6.0;
 /// Steps of the golden section: 1e-5 of the spacing of places.
 const GOLDEN_STEPS: u32 = 24;
 const GOLDEN: f64 = 0.618_033_988_749_894_8;
@@ -73,8 +73,8 @@ impl RegionHeights {
 impl RegionHeights {
     /// What a user has to know of the strip beside the region's boundary.
     pub(super) fn warning(&self, job: &Job) -> Option<String> {
-        (self.above_share > WORTH_SHARE).then(|| {
-            let height_mm = self.highest_beside.height_mm;
+        let height_mm = self.highest_beside.height_mm;
+        (height_mm > USUAL * job.scallop_mm).then(|| {
             let most = if height_mm >= MISSED_RADII * job.radius_mm {
                 "no ball reaches some of it".to_owned()
             } else {
