@@ -95,6 +95,38 @@ fn every_face_of_a_part_is_verified() {
     }
 }
 
+/// Two faces whose common edge cannot be read: the tool may cut them, so a job of their part does not pass unless that is accepted.
+#[test]
+fn unknown_faces_are_no_pass() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let text = std::fs::read_to_string(cad("blade.step")).unwrap();
+    let lost = text.replace("#618 = CIRCLE(", "#618 = CLOTHOID(");
+    assert_ne!(lost, text);
+    std::fs::write(folder.join("part.step"), lost).unwrap();
+    let import =
+        "import part.step --part --tool 3 --scallop-mm 1 --feed-mm-min 3000 --faces 13 -o part.toml --json";
+    let (summary, code) = json(folder, import);
+    assert_eq!(code, Some(0), "{summary}");
+    let name = "part.toml#13";
+    let (found, code) = json(folder, &format!("verify {name} --json"));
+    let failures = found["failures"].to_string();
+    assert!(
+        code == Some(1)
+            && failures.contains("2 faces of the part are not known")
+            && failures.contains("--accept-unknown-faces"),
+        "{found}"
+    );
+    let (found, code) = json(folder, &format!("verify {name} --accept-unknown-faces --json"));
+    assert_eq!((code, &found["passed"]), (Some(0), &Value::Bool(true)), "{found}");
+    assert!(
+        found["warnings"]
+            .to_string()
+            .contains("2 faces of the part are not known"),
+        "{found}"
+    );
+}
+
 /// A face that looks down is turned up; the file's +z reaches nothing of it.
 #[test]
 fn the_best_side_is_turned_up() {

@@ -391,8 +391,18 @@ impl<'m> Translation<'m> {
                     sense: 1.0,
                     solid: false,
                 }),
-                Ok(_) => {}
-                Err(why) => model.warnings.push(format!("surface {name} is left out: {why}")),
+                Ok(_) => {
+                    if let Some(owner) = stated.owner(&name) {
+                        model.left_out += 1;
+                        model.warnings.push(format!(
+                            "surface {name} is left out: it is of {owner}, which was not read"
+                        ));
+                    }
+                }
+                Err(why) => {
+                    model.left_out += usize::from(stated.owner(&name).is_some());
+                    model.warnings.push(format!("surface {name} is left out: {why}"));
+                }
             }
         }
     }

@@ -82,7 +82,6 @@ pub(super) fn json(
         "data_bytes_max": STORE_BYTES,
         "stations": found.stations,
         "not_measured": not_measured(job, found, axes),
-        "warnings": found.warnings,
     });
     match value {
         Value::Object(map) => map,

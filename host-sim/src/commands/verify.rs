@@ -192,6 +192,7 @@ fn json(job: &Job, prepared: &Prepared, found: &Verification) -> Value {
     );
     value.insert("passes_scanned".to_owned(), found.scanned.into());
     value.insert("failures".to_owned(), found.failures.clone().into());
+    value.insert("warnings".to_owned(), found.warnings.clone().into());
     value.insert("passed".to_owned(), found.failures.is_empty().into());
     Value::Object(value)
 }
