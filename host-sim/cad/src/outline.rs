@@ -88,8 +88,8 @@ pub(super) fn paths(on: &Periodic<'_>, loops: &[Vec<Edge>], sense: f64) -> Vec<P
     }) else {
         return paths;
     };
-    for k in 0..2 {
-        let Some(period) = periods[k] else { continue };
+    for (k, period) in periods.into_iter().enumerate() {
+        let Some(period) = period else { continue };
         let home = middle(&paths[largest], k)
             + if paths[largest].seam == Some(k) {
                 0.5 * period
