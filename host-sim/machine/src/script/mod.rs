@@ -287,7 +287,7 @@ mod tests {
             ),
             (
                 "tick 5: override 0\ntick 9: hold\ntick 10: resume\n",
-                1,
+                3,
                 "the feed is 0 from here on",
             ),
             (
