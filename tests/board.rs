@@ -412,8 +412,8 @@ fn in_lockstep_commands_and_halts_come_on_top_of_no_period() {
     assert_eq!(obey(&mut half, Instruction::Run { ticks: 1 }), []);
     assert!(matches!(tick(&mut half)[..], [Event::Halted(status)] if status.credit == 1));
     assert_eq!(tick(&mut half), [Event::Sample(reference()[3])]);
-    let told = obey(&mut half, Instruction::Clock(Clock::Free));
-    assert!(matches!(told[..], [Event::Halted(_), Event::Sample(sample)] if sample == reference()[4]));
+    let reported = obey(&mut half, Instruction::Clock(Clock::Free));
+    assert!(matches!(reported[..], [Event::Halted(_), Event::Sample(sample)] if sample == reference()[4]));
 }
 
 #[test]

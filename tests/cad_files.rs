@@ -200,6 +200,58 @@ fn a_lost_boundary_is_not_the_surfaces_own() {
     }
 }
 
+/// A trimmed surface with holes alone ends with its surface: the hole is not its boundary.
+#[test]
+fn an_implicit_boundary_is_not_another_one() {
+    let implicit = changed(HOOD, "144,5,1,1,7,29;", "144,5,0,1,0,29;");
+    let model = read_text("hood.igs", &implicit).unwrap();
+    let lost: Vec<&Face> = model.faces.iter().filter(|face| unknown(face)).collect();
+    let [face] = lost.as_slice() else {
+        panic!("{} boundaries are unknown: {:?}", lost.len(), model.warnings)
+    };
+    let error = machinable("", face, &Options::default()).unwrap_err();
+    assert!(error.what.contains("that of its surface"), "{error}");
+    assert_eq!(model.left_out, 0);
+}
+
+/// A face of which the reader has nothing is counted: of a job of its part it is not known whether the tool cuts it.
+#[test]
+fn faces_that_are_left_out_are_counted() {
+    for (name, whole) in [("sheet.step", SHEET), ("hood.igs", HOOD)] {
+        let model = read_text(name, whole).unwrap();
+        assert_eq!(model.left_out, 0, "{name}: {:?}", model.warnings);
+    }
+    // STEP: a face without a surface; beside it one that nothing refers to, which is of no part.
+    let second = "ADVANCED_FACE('',(#23),#99,.T.);";
+    let shell = changed(SHEET, "(#22)", "(#22,#80)");
+    let model = read_text("sheet.step", &with(&shell, &format!("#80={second}"))).unwrap();
+    assert_eq!(
+        (model.faces.len(), model.left_out),
+        (1, 1),
+        "{:?}",
+        model.warnings
+    );
+    let model = read_text("sheet.step", &with(SHEET, &format!("#80={second}"))).unwrap();
+    assert_eq!(
+        (model.faces.len(), model.left_out),
+        (1, 0),
+        "{:?}",
+        model.warnings
+    );
+    // IGES: a trimmed surface of a surface that does not exist; its own is a surface alone then.
+    let lost = changed(HOOD, "144,5,1,1,7,29;", "144,99,1,1,7,29;");
+    let model = read_text("hood.igs", &lost).unwrap();
+    assert_eq!(model.left_out, 1, "{:?}", model.warnings);
+    assert!(
+        model
+            .warnings
+            .iter()
+            .any(|warning| warning.contains("were not read: 1")),
+        "{:?}",
+        model.warnings
+    );
+}
+
 /// What has no end, or never begins, is not read.
 #[test]
 fn devices_and_pipes_are_refused() {

@@ -332,7 +332,7 @@ fn only_a_finite_speed_above_0_is_one() {
         for request in [probe(mm_s), jog(mm_s)] {
             let refused = rig.ask(&request);
             assert!(
-                matches!(refused, Err(Reason::BadSpeed { mm_s: told }) if told.to_bits() == mm_s.to_bits()),
+                matches!(refused, Err(Reason::BadSpeed { mm_s: reported }) if reported.to_bits() == mm_s.to_bits()),
                 "{request:?}: {refused:?}"
             );
         }

@@ -13,7 +13,7 @@ use interp_core::{
     sample::State,
 };
 use machine::remote::operate::{Operator, Setup, act, follow, make_ready};
-use machine::remote::session::{Event as Told, Stream};
+use machine::remote::session::{Event, Stream};
 use machine::remote::{RemoteError, Session, drive};
 use protocol::message::{Clock, Configuration, InputLines, LinkTimeoutAction, Reason, Request, Status};
 
@@ -114,7 +114,7 @@ impl Desk {
     /// The status that the board reports at the end of the run.
     fn halted(&mut self) -> Status {
         loop {
-            if let Told::Halted(status) = self.session.event().unwrap() {
+            if let Event::Halted(status) = self.session.event().unwrap() {
                 return status;
             }
         }
@@ -347,7 +347,7 @@ fn a_host_that_waits_is_not_gone() {
     desk.session.set_keep_alive(Some(std::time::Duration::ZERO));
     // The passes before the standstill come first.
     let mut events = std::iter::repeat_with(|| desk.session.event());
-    let last = events.find(|event| !matches!(event, Ok(Told::Pass(_))));
+    let last = events.find(|event| !matches!(event, Ok(Event::Pass(_))));
     assert!(matches!(last, Some(Err(RemoteError::Held))), "{last:?}");
 }
 
@@ -377,7 +377,7 @@ fn a_held_run_is_followed_to_its_end() {
     };
     let mut passes = 0;
     let ended = follow(&mut desk.session, &mut operator, |event| {
-        passes += u32::from(matches!(event, Told::Pass(_)));
+        passes += u32::from(matches!(event, Event::Pass(_)));
     });
     let ended = ended.unwrap();
     assert_eq!(operator.came, [Ok(State::Held), Ok(State::Running)]);

@@ -352,7 +352,7 @@ impl Desk {
     }
 }
 
-/// A start that waits for its spindle is over when an input forbids it: told to the host, with the spindle off.
+/// A start that waits for its spindle is over when an input forbids it: reported to the host, with the spindle off.
 #[test]
 fn a_start_that_an_input_forbids_meanwhile_is_over() {
     let mut desk = Desk::ready();

@@ -32,7 +32,7 @@ fn times(job: &Job) -> Option<JobTimes> {
     Some(meter.finish())
 }
 
-fn told(what: &str, stands: &[Stand]) -> String {
+fn describe(what: &str, stands: &[Stand]) -> String {
     let longest = stands.iter().max_by(|a, b| a.time_s.total_cmp(&b.time_s));
     longest.map_or_else(String::new, |stand| {
         let ms = 1e3 * stand.time_s;
@@ -70,7 +70,7 @@ fn neither_on_curved_passes_of_a_face_in_its_part() {
                 true
             })
             .unwrap();
-        assert_eq!(told(&face.to_string(), &meter.finish().stands), "");
+        assert_eq!(describe(&face.to_string(), &meter.finish().stands), "");
         assert!(
             f64::from(first) * job.machine.period_s() > first_s,
             "{face}: {first}"
@@ -104,7 +104,7 @@ fn never_in_contact_on_random_small_surfaces() {
         let job = small(number);
         if let Some(times) = times(&job) {
             ran += 1;
-            failed += &told(
+            failed += &describe(
                 &format!("{} {number}", KINDS[number % KINDS.len()]),
                 &times.stands,
             );
@@ -122,7 +122,7 @@ fn never_in_contact_on_random_small_surfaces() {
 fn never_where_campaigns_found_it() {
     for number in [37, 107, 112, 142, 527, 1361, 2143] {
         let times = times(&small(number)).unwrap();
-        assert_eq!(told(&number.to_string(), &times.stands), "");
+        assert_eq!(describe(&number.to_string(), &times.stands), "");
         assert!(times.whole_s < 60.0, "{number}: {} s", times.whole_s);
     }
 }
@@ -132,7 +132,7 @@ fn never_where_campaigns_found_it() {
 fn never_before_a_pass_that_is_costly_to_plan() {
     let text = include_str!("golden/short_passes.toml");
     let job = job_file::parse("short_passes", text).unwrap();
-    assert_eq!(told("short passes", &times(&job).unwrap().stands), "");
+    assert_eq!(describe("short passes", &times(&job).unwrap().stands), "");
 }
 
 #[test]
@@ -144,7 +144,7 @@ fn never_in_contact_on_the_sample_jobs() {
             let mut job = limited(job_file::load(&path).unwrap(), feed_mm_min / 60.0);
             job.pattern = Pattern::Zigzag;
             job.scallop_mm *= 4.0;
-            failed += &told(&format!("{name} {feed_mm_min}"), &times(&job).unwrap().stands);
+            failed += &describe(&format!("{name} {feed_mm_min}"), &times(&job).unwrap().stands);
         }
     }
     assert!(failed.is_empty(), "{failed}");

@@ -137,7 +137,7 @@ impl Model {
     }
 
     /// Checks one action: the status after it, and the samples reported during it.
-    fn follow(&mut self, deed: &Deed, status: Status, told: &[Sample]) -> Result<(), TestCaseError> {
+    fn follow(&mut self, deed: &Deed, status: Status, reported: &[Sample]) -> Result<(), TestCaseError> {
         if let (None, Some(fault)) = (self.before.fault, status.fault) {
             // Only a missed tick causes a fault here, in the single tick of that action: it stops the run that was under way.
             let Deed::Miss(missed @ 1..) = *deed else {
@@ -178,7 +178,7 @@ impl Model {
                 prop_assert!(status.state != State::Finished || count == self.whole.len());
             }
         }
-        for sample in told {
+        for sample in reported {
             let run = match &self.stopped {
                 Some((run, _)) if sample.state == State::Stopping => run,
                 _ => &self.whole,
@@ -204,9 +204,9 @@ proptest! {
         let mut model = Model::new(desk.board.status());
         for deed in deeds {
             act(&mut desk, deed.clone());
-            let told = core::mem::take(&mut desk.samples);
+            let reported = core::mem::take(&mut desk.samples);
             let status = desk.board.status();
-            model.follow(&deed, status, &told)?;
+            model.follow(&deed, status, &reported)?;
         }
     }
 }

@@ -143,7 +143,7 @@ fn from_a_bare_board_to_a_placed_job() {
     let (is_done, said) = sim(["run", &job, "--port", &port, "--work", "2"]);
     assert!(is_done && said.contains("bit for bit the same"), "{said}");
     assert!(said.contains("work offset 2"), "{said}");
-    // Somewhere else on the machine the same job leaves the travel: told before it starts.
+    // Somewhere else on the machine the same job leaves the travel: reported before it starts.
     bench.operate(&["goto", "57,40,-5"]);
     bench.operate(&["zero", "xy", "--work", "3"]);
     bench.operate(&["zero", "z", "--work", "3", "--at", "14"]);

@@ -97,10 +97,10 @@ fn fixtures_on_the_way_are_found() {
     job.setup.fixtures = vec![clamp(least_x - 30.0, least_x - 20.0, 100.0)];
     program(&job, Dialect::Grbl);
     job.setup.fixtures = vec![clamp(least_x - 30.0, least_x - 20.0, 119.0)];
-    let told = refusal(&job);
+    let reported = refusal(&job);
     assert!(
-        told.contains("fixture clamp") && told.contains("raise safe_z_mm"),
-        "{told}"
+        reported.contains("fixture clamp") && reported.contains("raise safe_z_mm"),
+        "{reported}"
     );
     // A bar above the part: in the way of every retract.
     job.setup.fixtures = vec![clamp(least_x - 1.0, most_x + 1.0, 80.0)];
@@ -109,10 +109,10 @@ fn fixtures_on_the_way_are_found() {
     // Without a home the way from the tool's place is not known.
     job.machine.home_mm = None;
     job.setup.fixtures = vec![clamp(least_x - 30.0, least_x - 20.0, 100.0)];
-    let told = refusal(&job);
+    let reported = refusal(&job);
     assert!(
-        told.contains("begins where the tool") && told.contains("home_mm"),
-        "{told}"
+        reported.contains("begins where the tool") && reported.contains("home_mm"),
+        "{reported}"
     );
 }
 
@@ -120,8 +120,11 @@ fn fixtures_on_the_way_are_found() {
 fn stock_and_travel_are_kept() {
     let mut job = with_home(90.0);
     job.machine.travel_mm = Some([[-100.0, 100.0], [-100.0, 100.0], [-50.0, 110.0]]);
-    let told = refusal(&job);
-    assert!(told.contains("moves z from") && told.contains("110 mm"), "{told}");
+    let reported = refusal(&job);
+    assert!(
+        reported.contains("moves z from") && reported.contains("110 mm"),
+        "{reported}"
+    );
     job.machine.travel_mm = None;
     // A wall of stock beside the part, as high as the traverses from home.
     let [least_x, most_x] = extent_x(&job);
@@ -129,8 +132,8 @@ fn stock_and_travel_are_kept() {
         low_mm: [least_x - 30.0, -100.0, -50.0],
         high_mm: [most_x + 10.0, 100.0, 119.0],
     });
-    let told = refusal(&job);
-    assert!(told.contains("the stock"), "{told}");
+    let reported = refusal(&job);
+    assert!(reported.contains("the stock"), "{reported}");
     job.machine.safe_z_mm = Some(-100.0);
     assert!(refusal(&job).contains("below the highest cut"));
 }

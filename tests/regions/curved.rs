@@ -168,8 +168,9 @@ fn strips_narrower_than_a_step_over_are_measured() {
             track.passes.remove(*without);
             let swept = measured(&track);
             assert_eq!(swept.scallop_verdict, Verdict::Violated, "{spacing:?} {without}");
-            let failure =
-                |told: &String| told.contains("mm high at u = ") || told.contains("no ball reaches");
+            let failure = |reported: &String| {
+                reported.contains("mm high at u = ") || reported.contains("no ball reaches")
+            };
             assert!(swept.failures.iter().any(failure), "{:?}", swept.failures);
         }
     }

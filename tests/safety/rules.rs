@@ -158,11 +158,11 @@ impl Bench {
         }
         // The end of a run is reported exactly once.
         if before.state.is_under_way() && !after.state.is_under_way() {
-            let told = self
+            let reported = self
                 .events
                 .iter()
                 .filter(|event| matches!(event, Event::Halted(_)));
-            prop_assert!(told.count() == 1, "{:?}", after.state);
+            prop_assert!(reported.count() == 1, "{:?}", after.state);
         }
         self.events.clear();
         prop_assert_eq!(

@@ -448,16 +448,16 @@ impl Trajectory {
         };
         let end = run.follow(steps);
         let (name, tick) = (&self.name, run.last.tick);
-        let told = |what| {
+        let located = |what| {
             format!(
                 "{name} from tick {}, {steps:?}: {what}, tick {tick}",
                 start.sample.tick
             )
         };
-        end.map_err(told)?;
+        end.map_err(located)?;
         run.outcome.worst = run.uses.worst;
         if !run.uses.are_permitted() {
-            return Err(told(format!("{:?} of the limits", run.uses.worst)));
+            return Err(located(format!("{:?} of the limits", run.uses.worst)));
         }
         Ok(run.outcome)
     }

@@ -13,6 +13,8 @@ use cad::Model;
 /// The reader of IGES files.
 pub(crate) struct Iges;
 
+/// Bounded surface, trimmed surface, face.
+const FACES: [usize; 3] = [143, 144, 510];
 /// The columns of a directory entry's "entity use" in its status, from 0.
 const USE: Range<usize> = 68..70;
 /// Largest number of curves of a composite curve.
@@ -49,6 +51,11 @@ fn sequence(entity: &str) -> Option<usize> {
 impl Stated for Text {
     fn boundaries(&self, face: &str) -> Option<usize> {
         self.0.boundaries(sequence(face)?)
+    }
+
+    fn faces(&self) -> Vec<String> {
+        let faces = self.0.iter().filter(|(_, entry)| FACES.contains(&entry.kind));
+        faces.map(|(sequence, _)| format!("D{sequence}")).collect()
     }
 
     fn owner(&self, surface: &str) -> Option<String> {

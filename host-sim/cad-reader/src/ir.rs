@@ -1,6 +1,6 @@
 //! Conversion of the model of `cadmpeg` to faces; the only file that depends on that model, with `ir_*.rs`.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::io::Cursor;
 
 use cadmpeg_core::decode::{DecodeDepth, DecodePolicy, ResourceLimits};
@@ -53,6 +53,11 @@ pub(crate) trait Stated {
     /// Number of boundaries of a face; `None` if the text does not say.
     fn boundaries(&self, _face: &str) -> Option<usize> {
         None
+    }
+
+    /// The faces that the file has, by their names.
+    fn faces(&self) -> Vec<String> {
+        Vec::new()
     }
 
     /// What trims or derives from a surface, in words; `None` for a surface on its own.
@@ -340,13 +345,36 @@ impl<'m> Translation<'m> {
             }
         }
         model.solids = solids.all();
-        self.lone_surfaces(&mut model, stated);
+        let named = model.left_out;
+        let owned = self.lone_surfaces(&mut model, stated);
+        let unread = self.unread_faces(&mut model, stated);
+        // A face that was not read may be counted already, by its surface.
+        model.left_out = model.left_out.max((named + unread).saturating_sub(owned));
         model.warnings.truncate(WARNINGS_MAX);
         Ok(model)
     }
 
-    /// Surfaces without a face, common in IGES files.
-    fn lone_surfaces(&self, model: &mut Model, stated: &dyn Stated) {
+    /// Number of faces that the file has and of which the reader gave nothing but, perhaps, their surfaces.
+    fn unread_faces(&self, model: &mut Model, stated: &dyn Stated) -> usize {
+        let read: HashSet<String> = self
+            .source
+            .faces
+            .iter()
+            .map(|face| entity(face.id.as_str()))
+            .collect();
+        let mut unread = stated.faces();
+        unread.retain(|name| !read.contains(name));
+        if let Some(first) = unread.first() {
+            let count = unread.len();
+            let warning = format!("faces of the file that were not read: {count}, the first is {first}");
+            model.warnings.insert(0, warning);
+        }
+        unread.len()
+    }
+
+    /// Surfaces without a face, common in IGES files. Returns how many of them are taken in with the boundary of a face that was not read.
+    fn lone_surfaces(&self, model: &mut Model, stated: &dyn Stated) -> usize {
+        let mut owned = 0;
         let mut used: Vec<&str> = self
             .source
             .faces
@@ -380,7 +408,10 @@ impl<'m> Translation<'m> {
                     name: None,
                     colour: None,
                     boundary: match stated.owner(&name) {
-                        Some(owner) => Boundary::Unknown(format!("it is of {owner}, which was not read")),
+                        Some(owner) => {
+                            owned += 1;
+                            Boundary::Unknown(format!("it is of {owner}, which was not read"))
+                        }
                         None if self.is_part_of_surface(item.id.as_str()) => {
                             Boundary::Unknown("it is a part of another surface".to_owned())
                         }
@@ -405,6 +436,7 @@ impl<'m> Translation<'m> {
                 }
             }
         }
+        owned
     }
 
     fn bodies_of_shells(&self) -> HashMap<&'m str, &'m cadmpeg_ir::topology::Body> {
@@ -538,8 +570,13 @@ impl<'m> Translation<'m> {
         )
     }
 
+    /// What a surface is made of.
     fn definition(&self, id: &str) -> Option<&Made> {
-        let index = self.constructions.get(id)?;
+        let item = self.source.surfaces.get(*self.surfaces.get(id)?)?;
+        let SurfaceGeometry::Procedural { construction, .. } = &item.geometry else {
+            return None;
+        };
+        let index = self.constructions.get(construction.as_str())?;
         let made = self.source.procedural_surfaces.get(*index)?;
         Some(made.definition())
     }

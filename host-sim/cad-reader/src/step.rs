@@ -1,8 +1,10 @@
 //! STEP (ISO 10303-21): AP203, AP214, AP242.
 
+use std::collections::HashSet;
+
 use crate::format::Reader;
 use crate::ir::{self, Stated};
-use crate::step_records::{Records, arguments, references};
+use crate::step_records::{Record, Records, arguments, references};
 use crate::step_units::{Units, units};
 use cad::CadError;
 use cad::Model;
@@ -11,6 +13,8 @@ use glam::DVec3;
 /// The reader of STEP files.
 pub(crate) struct Step;
 
+/// Faces with a surface.
+const FACES: [&str; 2] = ["ADVANCED_FACE", "FACE_SURFACE"];
 /// Largest nesting depth of parentheses; valid files stay below 10.
 const NESTING_MAX: usize = 64;
 /// Largest size of an entity, bytes; a B-spline surface with 100000 poles is smaller.
@@ -79,9 +83,27 @@ impl Stated for Text<'_> {
         let parts = record.parts();
         let (_, inner) = parts
             .iter()
-            .find(|(name, _)| matches!(*name, "ADVANCED_FACE" | "FACE_SURFACE" | "FACE"))?;
+            .find(|(name, _)| FACES.contains(name) || *name == "FACE")?;
         let words = arguments(inner);
         Some(references(words.iter().find(|word| word.starts_with(b"("))?).len())
+    }
+
+    fn faces(&self) -> Vec<String> {
+        let is_face = |record: &Record<'_>| {
+            let parts = record.parts();
+            parts.iter().any(|(name, _)| FACES.contains(name))
+        };
+        // A face that nothing refers to is of no part.
+        let referred: HashSet<u64> = self
+            .records
+            .iter()
+            .flat_map(|(_, record)| record.references())
+            .collect();
+        let faces = self.records.iter().filter(|(_, record)| is_face(record));
+        faces
+            .filter(|(id, _)| referred.contains(id))
+            .map(|(id, _)| format!("#{id}"))
+            .collect()
     }
 
     fn owner(&self, surface: &str) -> Option<String> {

@@ -11,6 +11,10 @@ use super::spline::{Axis, Pole, SplineCurve};
 const SEEDS: usize = 12;
 /// Newton iterations from the best seed.
 const STEPS: usize = 30;
+/// Largest number of local minima that are tried.
+const TRIED: usize = 4;
+/// Squared distance of a point that is on the curve, mm2: no other minimum is tried.
+const ON_CURVE_MM2: f64 = 1e-8;
 /// Tolerance of an arc's angle above a multiple of 90 degrees, rad, for rounding in files: it adds no further arc.
 const ANGLE_SLACK_RAD: f64 = 1e-9;
 
@@ -176,17 +180,37 @@ impl Curve {
     /// Parameter of the point that minimises `gap`, a function of the curve's point and its derivatives that returns the squared
     /// distance and half its derivatives by the parameter.
     fn least(&self, range: [f64; 2], pieces: &[f64], gap: &Gap<'_>) -> f64 {
+        let place = |piece: &[f64], k: usize| piece[0] + (piece[1] - piece[0]) * k as f64 / SEEDS as f64;
+        let seeds: Vec<(f64, f64)> = pieces
+            .windows(2)
+            .flat_map(|piece| (0..=SEEDS).map(move |k| place(piece, k)))
+            .map(|t| (gap(&self.at(t)).0, t))
+            .collect();
+        let distance = |index: usize| seeds.get(index).map_or(f64::INFINITY, |seed| seed.0);
+        let mut lowest: Vec<usize> = (0..seeds.len())
+            .filter(|k| seeds[*k].0 <= distance(k.wrapping_sub(1)) && seeds[*k].0 <= distance(k + 1))
+            .collect();
+        lowest.sort_by(|a, b| distance(*a).total_cmp(&distance(*b)));
         let mut best = (f64::INFINITY, range[0]);
-        for piece in pieces.windows(2) {
-            for k in 0..=SEEDS {
-                let t = piece[0] + (piece[1] - piece[0]) * k as f64 / SEEDS as f64;
-                let distance = gap(&self.at(t)).0;
-                if distance < best.0 {
-                    best = (distance, t);
-                }
+        for index in lowest.into_iter().take(TRIED) {
+            let mut found = self.newton(seeds[index], range, gap);
+            if found.0 > ON_CURVE_MM2 {
+                let beside = [index.saturating_sub(1), (index + 1).min(seeds.len() - 1)];
+                let start = self.golden(beside.map(|k| seeds[k].1), gap);
+                let other = self.newton(start, range, gap);
+                found = if other.0 < found.0 { other } else { found };
+            }
+            best = if found.0 < best.0 { found } else { best };
+            if best.0 <= ON_CURVE_MM2 {
+                break;
             }
         }
-        let mut t = best.1;
+        best.1
+    }
+
+    /// Squared distance and parameter after Newton's method, or those of the start where it is nearer.
+    fn newton(&self, start: (f64, f64), range: [f64; 2], gap: &Gap<'_>) -> (f64, f64) {
+        let mut t = start.1;
         for _ in 0..STEPS {
             let (_, slope, curvature) = gap(&self.at(t));
             let next = (t - slope / curvature).clamp(range[0], range[1]);
@@ -195,7 +219,24 @@ impl Curve {
             }
             t = next;
         }
-        if gap(&self.at(t)).0 <= best.0 { t } else { best.1 }
+        let found = (gap(&self.at(t)).0, t);
+        if found.0 <= start.0 { found } else { start }
+    }
+
+    /// Squared distance and parameter after a golden section between two parameters.
+    fn golden(&self, [mut low, mut high]: [f64; 2], gap: &Gap<'_>) -> (f64, f64) {
+        const SHARE: f64 = 0.618_033_988_749_894_8;
+        let value = |t: f64| gap(&self.at(t)).0;
+        for _ in 0..STEPS {
+            let [left, right] = [high - SHARE * (high - low), low + SHARE * (high - low)];
+            if value(left) < value(right) {
+                high = right;
+            } else {
+                low = left;
+            }
+        }
+        let middle = 0.5 * (low + high);
+        (value(middle), middle)
     }
 
     /// Parameter within `range` of the point whose distance to `to` is least, both mapped by `map` (linear).

@@ -18,6 +18,8 @@ const PATCHES_MAX: usize = STORE_WORDS / POLYNOMIAL_WORDS;
 const LINES: usize = 17;
 /// Interior points per span at which the error on a line is measured.
 const PLACES: usize = 6;
+/// Interior points per span of the surface, in addition.
+const PLACES_A_SPAN: usize = 2;
 /// Points per side of a patch at which the deviation of the fit is measured.
 const DENSE: usize = 9;
 /// Points per side of a patch, a subset of the [`DENSE`] ones, for a fit of more patches than the store holds, whose number is reported only.
@@ -177,7 +179,8 @@ fn continuity(surface: &Surface, k: usize, ranges: [[f64; 2]; 2], joint: f64) ->
     } else {
         2
     };
-    lines(ranges[1 - k])
+    lines(surface, 1 - k, ranges[1 - k])
+        .into_iter()
         .map(|line| {
             let [before, after] = [-BESIDE, BESIDE].map(|by| derivatives(joint + by * width, line));
             let speed = before[0].length();
@@ -195,9 +198,22 @@ fn continuity(surface: &Surface, k: usize, ranges: [[f64; 2]; 2], joint: f64) ->
         .unwrap_or(0)
 }
 
-/// Even places of the range across, on which a direction is measured.
-fn lines(across: [f64; 2]) -> impl Iterator<Item = f64> {
-    (0..LINES).map(move |line| across[0] + (across[1] - across[0]) * line as f64 / (LINES - 1) as f64)
+/// Places of the range across, on which a direction is measured: even ones, and the middle of each span of the surface, of which one may have a bump that the others do not show.
+fn lines(surface: &Surface, across: usize, range: [f64; 2]) -> Vec<f64> {
+    let [low, high] = range;
+    let even = (0..LINES).map(|line| low + (high - low) * line as f64 / (LINES - 1) as f64);
+    let spans = spans(surface, across, range);
+    even.chain(spans.iter().map(|[start, end]| 0.5 * (start + end)))
+        .collect()
+}
+
+/// Spans of the surface between its own knots within a range.
+fn spans(surface: &Surface, k: usize, range: [f64; 2]) -> Vec<[f64; 2]> {
+    let inside = joints(surface, k, range).into_iter().map(|(knot, _)| knot);
+    let mut ends: Vec<f64> = inside.chain(range).collect();
+    ends.sort_by(f64::total_cmp);
+    ends.dedup();
+    ends.windows(2).map(|span| [span[0], span[1]]).collect()
 }
 
 /// Knots of one direction with which the lines in that direction are within the tolerance.
@@ -223,7 +239,7 @@ fn direction(
             return Err(FitError::TooManySpans);
         }
         let collocation = Collocation::new(knots(&divided(&breaks, &parts)));
-        let worst = errors(surface, k, ranges[1 - k], &collocation, &breaks, &parts)?;
+        let worst = errors(surface, k, ranges, &collocation, &breaks, &parts)?;
         if worst.iter().all(|worst| *worst <= tolerance_mm) {
             return Ok(collocation.axis);
         }
@@ -260,7 +276,7 @@ fn fewest(surface: &Surface, k: usize, ranges: [[f64; 2]; 2], tolerance_mm: f64)
         }
         let collocation = Collocation::new(knots(&breaks));
         let whole = vec![1; breaks.len() - 1];
-        let worst = errors(surface, k, ranges[1 - k], &collocation, &breaks, &whole)?;
+        let worst = errors(surface, k, ranges, &collocation, &breaks, &whole)?;
         if worst.iter().all(|worst| *worst <= tolerance_mm) {
             return Ok(collocation.axis);
         }
@@ -272,11 +288,11 @@ fn fewest(surface: &Surface, k: usize, ranges: [[f64; 2]; 2], tolerance_mm: f64)
     }
 }
 
-/// The largest error between two breaks each, on lines in that direction at even places of the other range: at [`PLACES`] for each of the parts.
+/// The largest error between two breaks each, on lines in that direction: at [`PLACES`] for each of the parts, and at [`PLACES_A_SPAN`] in each span of the surface.
 fn errors(
     surface: &Surface,
     k: usize,
-    other: [f64; 2],
+    ranges: [[f64; 2]; 2],
     collocation: &Collocation,
     breaks: &[(f64, usize)],
     parts: &[usize],
@@ -286,20 +302,27 @@ fn errors(
         let (u, v) = if k == 0 { (t, line) } else { (line, t) };
         whole.at(u, v).point
     };
+    let evenly = |[start, end]: [f64; 2], count: usize| {
+        (0..count).map(move |i| start + (end - start) * (i as f64 + 0.5) / count as f64)
+    };
+    let of_parts = breaks.windows(2).zip(parts);
+    let of_spans = spans(surface, k, ranges[k]).into_iter();
+    let places: Vec<f64> = of_parts
+        .flat_map(|(span, parts)| evenly([span[0].0, span[1].0], PLACES * parts))
+        .chain(of_spans.flat_map(|span| evenly(span, PLACES_A_SPAN)))
+        .collect();
     let mut worst = vec![0.0_f64; parts.len()];
-    for line in lines(other) {
+    for line in lines(surface, 1 - k, ranges[1 - k]) {
         let points: Vec<DVec3> = collocation.places.iter().map(|t| point(*t, line)).collect();
         if !points.iter().all(|point| point.is_finite()) {
             return Err(FitError::NotFinite);
         }
         let poles = collocation.solve(&points);
-        for ((worst, span), parts) in worst.iter_mut().zip(breaks.windows(2)).zip(parts) {
-            let places = PLACES * parts;
-            for i in 0..places {
-                let t = span[0].0 + (span[1].0 - span[0].0) * (i as f64 + 0.5) / places as f64;
-                let fitted = on_curve(&collocation.axis, &poles, t);
-                *worst = worst.max(fitted.distance(point(t, line)));
-            }
+        for &t in &places {
+            let fitted = on_curve(&collocation.axis, &poles, t);
+            let after = breaks.partition_point(|(knot, _)| *knot <= t);
+            let worst = &mut worst[after.clamp(1, parts.len()) - 1];
+            *worst = worst.max(fitted.distance(point(t, line)));
         }
     }
     Ok(worst)
@@ -357,15 +380,19 @@ pub(super) fn deviation_of_moved(surface: &Surface, fit: &SplineSurface, moved_m
     }
 }
 
-/// Largest distance and angle between a surface and its fit, at this many points per side of each patch of the fit.
+/// Largest distance and angle between a surface and its fit, at this many points per side of each patch of the fit, and [`PLACES_A_SPAN`] per side of each patch of the surface at least.
 fn deviation(surface: &Surface, fit: &SplineSurface, each: usize) -> Deviation {
     let places = |k: usize| -> Vec<f64> {
         let breaks = fit.axes[k].breaks();
-        let spans = breaks.windows(2);
-        let inside = |i: usize| (i as f64 + 0.5) / each as f64;
-        spans
-            .flat_map(|span| (0..each).map(move |i| span[0] + (span[1] - span[0]) * inside(i)))
-            .collect()
+        let own = spans(surface, k, fit.domain()[k]);
+        let in_patch = |patch: &[f64]| -> Vec<f64> {
+            let [start, end] = [patch[0], patch[1]];
+            let within = own.iter().filter(|[low, high]| *high > start && *low < end);
+            let count = each.max(PLACES_A_SPAN * within.count());
+            let place = |i: usize| start + (end - start) * (i as f64 + 0.5) / count as f64;
+            (0..count).map(place).collect()
+        };
+        breaks.windows(2).flat_map(in_patch).collect()
     };
     let (us, vs) = (places(0), places(1));
     let surface = Periodic::new(surface);

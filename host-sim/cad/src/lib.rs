@@ -26,6 +26,7 @@ mod fit;
 mod interpolation;
 mod invert;
 mod job;
+mod loops;
 mod machinable;
 mod measure;
 mod orientation;
@@ -38,6 +39,7 @@ mod removal;
 mod spline;
 mod straight;
 mod surface;
+mod sweeps;
 #[cfg(test)]
 mod tests;
 mod trim;

@@ -10,6 +10,7 @@ use std::time::{Duration, Instant, SystemTime};
 use serde::{Deserialize, Serialize};
 
 use super::orientation::turn_outwards;
+use super::sweeps::with_seam;
 use super::{CadError, Face, Solid};
 use programs::{Part, Unavailable};
 
@@ -156,6 +157,7 @@ fn run(file: &str, path: &Path, reader: &Path) -> Result<Model, CadError> {
         .map_err(failed)?;
     let mut model = serde_json::from_slice::<Result<Model, CadError>>(&text)
         .unwrap_or_else(|_| Err(broken(format!("the reader failed on this file ({status})"))))?;
+    model.faces.iter_mut().for_each(with_seam);
     turn_outwards(&mut model.faces, &model.solids);
     Ok(model)
 }

@@ -8,6 +8,7 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 use super::curve::Curve;
 use super::placement::Placement;
 use super::spline::{SplineCurve, SplineSurface};
+use super::sweeps::axis_crossings;
 
 /// Step of a difference quotient, as a share of the range; only for second derivatives of offset surfaces.
 const DIFFERENCE: f64 = 1e-5;
@@ -256,7 +257,7 @@ impl Surface {
         }
     }
 
-    /// Range of parameter k without a point of a cone or of a torus that meets its axis within it, around a place; unbounded where there is none.
+    /// Range of parameter k without a point in which a surface of revolution meets its axis within it, around a place; unbounded where there is none.
     pub(super) fn between_points(&self, k: usize, place: f64) -> [f64; 2] {
         match self {
             Self::Cone { radius, slope, .. } if k == 1 && *slope != 0.0 => {
@@ -276,6 +277,30 @@ impl Surface {
                 } else {
                     [turns + first, turns + TAU - first]
                 }
+            }
+            Self::Revolution {
+                profile,
+                range,
+                origin,
+                axis,
+            } if k == 1 => {
+                let points = axis_crossings(profile, *range, *origin, *axis);
+                // Those of a closed profile are met again a period further.
+                let all: Vec<f64> = match profile.period() {
+                    Some(period) => [-2.0, -1.0, 0.0, 1.0, 2.0]
+                        .iter()
+                        .flat_map(|turn| points.iter().map(move |point| point + turn * period))
+                        .collect(),
+                    None => points,
+                };
+                all.into_iter()
+                    .fold([f64::NEG_INFINITY, f64::INFINITY], |[low, high], point| {
+                        if point <= place {
+                            [low.max(point), high]
+                        } else {
+                            [low, high.min(point)]
+                        }
+                    })
             }
             _ => [f64::NEG_INFINITY, f64::INFINITY],
         }

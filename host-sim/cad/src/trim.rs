@@ -8,7 +8,8 @@
 
 use super::crossings::crossing;
 use super::interpolation::between;
-use super::outline::{Outline, Path, Winding, complementary, paths, winding};
+use super::loops::{Path, Winding, complementary, paths, winding};
+use super::outline::Outline;
 use super::remap::Remap;
 use super::surface::{Periodic, Surface};
 use super::{Boundary, Edge, Face};

@@ -38,6 +38,7 @@ pub use file::{
     Face, FaceError, FaceReader, FaceRegion, FaceSurface, PART_TOLERANCE_MM, STEEPEST_DEG,
     TOLERANCE_DEFAULT_MM, TOLERANCE_MAX_MM,
 };
+pub use machine::HEIGHT_MAX_MM;
 pub use program::jobs_of;
 pub use steps::slots_max_us;
 

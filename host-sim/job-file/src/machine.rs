@@ -9,7 +9,7 @@ use crate::section::Section;
 use crate::{homing, spindle, steps};
 
 /// Largest clearance and plunge, mm.
-const HEIGHT_MAX_MM: f64 = 1000.0;
+pub const HEIGHT_MAX_MM: f64 = 1000.0;
 
 /// Ranges of the limits that the core takes: mm/s, mm/s^2, mm/s^3.
 const LIMIT_RANGES: [[f64; 2]; 3] = [[1e-3, 1e5], [1e-2, 1e7], [1e-1, 1e9]];

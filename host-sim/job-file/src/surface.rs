@@ -10,6 +10,8 @@ use crate::section::{Section, Value};
 
 /// Highest degree of a NURBS surface: the core's patches are bicubic.
 const DEGREE_MAX: usize = 3;
+/// Largest magnitude of a knot: beyond it a range may have no digits left for its places.
+const KNOT_MAX: f64 = 1e9;
 /// Excess over a full turn allowed for `v_rad`, rad: rounding of a 2 pi written in decimals.
 const TURN_TOLERANCE_RAD: f64 = 1e-9;
 /// Negative radius allowed for a profile, mm: rounding of a profile that ends on the axis.
@@ -276,6 +278,10 @@ fn read_knots(section: &Section<'_>, key: &str, degree: usize, poles: usize) -> 
         ));
     }
     let knots = entries.iter().map(Value::number).collect::<Result<Vec<_>, _>>()?;
+    if let Some(at) = knots.iter().position(|knot| knot.abs() > KNOT_MAX) {
+        let what = format!("is {}, beyond {KNOT_MAX:e}", knots[at]);
+        return Err(entries[at].error(&what, "scale the knots: the surface stays as it is"));
+    }
     if let Some(at) = (1..knots.len()).find(|i| knots[*i] < knots[i - 1]) {
         let what = format!("is {}, below the previous one ({})", knots[at], knots[at - 1]);
         return Err(entries[at].error(&what, "give knots in ascending order"));

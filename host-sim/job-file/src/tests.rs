@@ -315,6 +315,7 @@ fn types_and_shapes() {
 #[rustfmt::skip] // a table: a row a line
 fn ranges() {
     check(&[
+        (NURBS, "0.5, 1, 1, 1]", "0.5, 1e15, 1e15, 1e15]", 4, 26, "is 1000000000000000, beyond 1e9"),
         (REVOLVED, "600", "0", 13, 15, "must be above 0.06 and at most 600000, not 0"),
         (REVOLVED, "600", "nan", 13, 15, "must be a finite number"),
         (REVOLVED, "600", "1e999", 13, 15, "must be a finite number"),

@@ -16,7 +16,7 @@ use crate::region::{Made, Request};
 use crate::tool::{Reason, Tool};
 
 /// The method by which regions are made: others in a cache are not used.
-const METHOD: u32 = 14;
+const METHOD: u32 = 15;
 /// Folder beside the job in which regions are kept.
 const CACHE: &str = ".isofeed";
 /// How deep the tool may enter the part, mm, where no part says it: only the grid of a face alone depends on it.

@@ -39,7 +39,7 @@ pub(super) struct Arguments {
     #[arg(long, value_enum, default_value = "g94")]
     feed_mode: FeedMode,
     /// Clearance of the safe height, mm, instead of the job's `clearance_mm`.
-    #[arg(long, value_name = "MM", value_parser = numbers::length, allow_negative_numbers = true)]
+    #[arg(long, value_name = "MM", value_parser = numbers::height, allow_negative_numbers = true)]
     clearance: Option<f64>,
     /// Machine profile (TOML): travel, and the time that the spindle needs to its speed (3 s without it).
     #[arg(long, value_name = "FILE")]

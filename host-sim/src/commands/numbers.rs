@@ -2,6 +2,8 @@
 
 use std::result::Result;
 
+use job_file::HEIGHT_MAX_MM;
+
 /// Largest magnitude of a length, mm: a position is 32 bits of nanometres.
 const LENGTH_MAX_MM: f64 = 2147.0;
 /// Longest time, s: a day.
@@ -48,6 +50,13 @@ pub(super) fn thickness(text: &str) -> Result<f64, String> {
     })
 }
 
+/// A height in mm that may be 0, as those of a job.
+pub(super) fn height(text: &str) -> Result<f64, String> {
+    number(text, &format!("a height in mm from 0 to {HEIGHT_MAX_MM}"), |mm| {
+        (0.0..=HEIGHT_MAX_MM).contains(&mm)
+    })
+}
+
 /// A length in mm above 0.
 pub(super) fn length(text: &str) -> Result<f64, String> {
     number(
@@ -84,7 +93,7 @@ mod tests {
     fn no_option_takes_what_is_no_number() {
         for text in ["nan", "-nan", "inf", "-inf", "infinity", "1e999", "", "x", "1 2"] {
             assert!(speed(text).is_err(), "{text}");
-            for parse in [rpm, coordinate, thickness, length, seconds, share] {
+            for parse in [rpm, coordinate, thickness, height, length, seconds, share] {
                 assert!(parse(text).is_err(), "{text}");
             }
         }
@@ -102,6 +111,8 @@ mod tests {
         assert!(coordinate("2148").is_err());
         assert_eq!(thickness("0"), Ok(0.0));
         assert!(thickness("-0.1").is_err());
+        assert_eq!((height("0"), height("1000")), (Ok(0.0), Ok(1000.0)));
+        assert!(height("-1").is_err() && height("1000.1").is_err());
         assert_eq!(length("1e-3"), Ok(1e-3));
         assert!(length("0").is_err() && length("-3").is_err() && length("2148").is_err());
         assert_eq!((seconds("0.5"), seconds("86400")), (Ok(0.5), Ok(86_400.0)));

@@ -56,6 +56,7 @@ pub(super) fn json(
         "scallop_area_by_tenth": found.scallop_histogram,
         "region_heights": found.region.map(|region| json!({
             "area_mm2": region.area_mm2, "served_share": region.served_share, "ridges_share": region.ridges_share, "places": region.places,
+            "places_a_step_over": region.places_a_step_over,
             "highest_mm": region.highest.height_mm,
             "highest_at": { "u": region.highest.uv[0], "v": region.highest.uv[1], "place_mm": region.highest.point_mm.to_array() },
             "highest_beside_mm": region.highest_beside.height_mm, "above_beside_share": region.above_share,

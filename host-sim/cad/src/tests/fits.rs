@@ -204,6 +204,46 @@ fn knots_that_the_tolerance_does_not_need_are_left_out() {
     assert_eq!(made.patches, fitted.patches());
 }
 
+/// A plane of many spans with one pole lifted: the fit has the bump, wherever it is.
+#[test]
+fn a_bump_within_few_spans_is_not_missed() {
+    const SPANS: u32 = 120;
+    const COUNT: usize = SPANS as usize + 3;
+    let axis = || {
+        let mut knots = vec![0.0; 3];
+        knots.extend((0..=SPANS).map(f64::from));
+        knots.extend([f64::from(SPANS); 3]);
+        Axis { degree: 3, knots }
+    };
+    // Poles at the Greville abscissae: the parameters are the coordinates.
+    let knots = axis().knots;
+    let place = |pole: usize| knots[pole + 1..pole + 4].iter().sum::<f64>() / 3.0;
+    for [i, k] in [[5, 5], [19, 44], [61, 62], [100, 9]] {
+        let lift = |row: usize, column: usize| if [row, column] == [i, k] { 0.02 } else { 0.0 };
+        let poles = (0..COUNT).map(|row| {
+            (0..COUNT)
+                .map(|column| [place(row), place(column), lift(row, column), 1.0])
+                .collect()
+        });
+        let surface = Surface::Spline(SplineSurface {
+            axes: [axis(), axis()],
+            poles: poles.collect(),
+        });
+        let ranges = [[0.0, f64::from(SPANS)]; 2];
+        let made = fit::fit(&surface, ranges, 1e-3, Knots::Fewest);
+        let Ok((fitted, said)) = made else {
+            panic!("[{i}, {k}] has no fit")
+        };
+        assert!(said.max_mm <= 1e-3);
+        // Over the pole, and around it.
+        for by in [-1.3, -0.4, 0.0, 0.7, 1.1] {
+            let [u, v] = [place(i) + by, place(k) - 0.5 * by];
+            let off_mm = surface.at(u, v).point.distance(fitted.at(u, v).point);
+            assert!(off_mm <= 1.5e-3, "[{i}, {k}]: {off_mm} mm at {u}, {v}");
+        }
+    }
+}
+
 /// Ends of a range that differ from a knot by rounding make no joint.
 #[test]
 fn knots_at_the_ends_are_no_joints() {

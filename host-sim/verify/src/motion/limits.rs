@@ -336,7 +336,7 @@ pub fn failures(peaks: &Peaks) -> Vec<String> {
         match peak.verdict {
             Verdict::Met => {}
             Verdict::Violated => sentences.push(format!(
-                "{} uses {share:.3} of its {name} limit ({:.1} {unit}) at tick {}",
+                "{} uses {share:.3} of its {name} limit ({:.1} {unit}) at tick {}: lower the feed",
                 AXES[axis], peak.axes[axis], peak.ticks[axis]
             )),
             Verdict::Unknown => sentences.push(format!(

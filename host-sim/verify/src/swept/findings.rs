@@ -459,7 +459,7 @@ impl SweptResult {
                 "{skipped} stations without a normal were left out of the scallop measurement"
             ));
         }
-        warnings.extend(self.region.as_ref().and_then(|region| region.warning(job)));
+        warnings.extend(self.region.iter().flat_map(|region| region.warnings(job)));
         if self.has_no_gap(job) {
             warnings.push(
                 "the region holds no two passes beside each other: there is no scallop between passes to be measured"

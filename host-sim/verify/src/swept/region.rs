@@ -17,6 +17,8 @@ use oracle::Oracle;
 /// Lines of constant path parameter a step-over, and places on them a step-over, where the surface is fastest.
 const LINES_A_STEP_OVER: f64 = 6.0;
 const PLACES_A_STEP_OVER: f64 = 12.0;
+/// Below so many lines or places a step-over, what lies between them may be missed.
+const FEW_A_STEP_OVER: f64 = 4.0;
 /// Least and largest number of lines, and of places on a line.
 const COUNT: [f64; 2] = [48.0, 16_384.0];
 /// Largest number of places.
@@ -50,6 +52,8 @@ pub struct RegionHeights {
     pub above_share: f64,
     /// Number of places.
     pub places: usize,
+    /// Lines a step-over, or places a step-over on them where those are fewer, where the surface is fastest.
+    pub places_a_step_over: f64,
 }
 
 impl RegionHeights {
@@ -68,11 +72,22 @@ impl RegionHeights {
             )
         })
     }
-}
 
-impl RegionHeights {
-    /// What a user has to know of the strip beside the region's boundary.
-    pub(super) fn warning(&self, job: &Job) -> Option<String> {
+    /// What a user has to know of the measurement, and of the strip beside the region's boundary.
+    pub(super) fn warnings(&self, job: &Job) -> impl Iterator<Item = String> {
+        self.few_places().into_iter().chain(self.high_beside(job))
+    }
+
+    fn few_places(&self) -> Option<String> {
+        (self.places_a_step_over < FEW_A_STEP_OVER).then(|| {
+            format!(
+                "the region is measured at {:.1} places a step-over: material between them may be higher; cut a smaller region, or ask for a larger scallop height",
+                self.places_a_step_over
+            )
+        })
+    }
+
+    fn high_beside(&self, job: &Job) -> Option<String> {
         let height_mm = self.highest_beside.height_mm;
         (height_mm > USUAL * job.scallop_mm).then(|| {
             let most = if height_mm >= MISSED_RADII * job.radius_mm {
@@ -109,6 +124,7 @@ struct Grid {
     side: [f64; 2],
     lines: u32,
     places: u32,
+    places_a_step_over: f64,
 }
 
 impl Grid {
@@ -133,9 +149,10 @@ impl Grid {
             most[0] = most[0].max(along.length() / step_over_mm);
             most[1] = most[1].max(across.length() / step_over_mm);
         }
+        let step_overs = [most[0] * (path[1] - path[0]), most[1] * (side[1] - side[0])];
         let wanted = [
-            most[0] * (path[1] - path[0]) * LINES_A_STEP_OVER,
-            most[1] * (side[1] - side[0]) * PLACES_A_STEP_OVER,
+            step_overs[0] * LINES_A_STEP_OVER,
+            step_overs[1] * PLACES_A_STEP_OVER,
         ];
         let room = (PLACES_MAX / (wanted[0] * wanted[1])).sqrt().min(1.0);
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
@@ -145,6 +162,7 @@ impl Grid {
             side,
             lines,
             places,
+            places_a_step_over: (f64::from(lines) / step_overs[0]).min(f64::from(places) / step_overs[1]),
         }
     }
 
@@ -214,6 +232,7 @@ impl RegionSearch<'_> {
             highest_beside: besides.reduce(FieldPoint::higher).unwrap_or_default(),
             above_share: share(sum(&|line| line.above)),
             places: lines.iter().map(|line| line.places).sum(),
+            places_a_step_over: grid.places_a_step_over,
         }
     }
 

@@ -8,10 +8,8 @@ const FACTOR: u32 = 3_000;
 const ASSEMBLE: u32 = 3_950;
 const SOLVE: u32 = 22_500;
 const REACH: u32 = 2_600;
-/// On top of these, for each jump after the node.
-const FACTOR_JUMP: u32 = 1_800;
-const ASSEMBLE_JUMP: u32 = 4_600;
-const REACH_JUMP: u32 = 2_300;
+/// On top of the others, for each jump after the node.
+const JUMP: u32 = 3_500;
 const CHECK: u32 = 1_900;
 /// On top of that where the path has jumps.
 const CHECK_JUMPS: u32 = 200;
@@ -27,7 +25,7 @@ const LIST_LEAST: u32 = 2_000;
 impl Planner {
     /// Cycles of the next piece of work.
     pub(crate) fn cycles(&self, plan: &Plan) -> u32 {
-        let jumps = |cycles: u32| cycles * u32::from(self.sweep.jumps(plan));
+        let jumps = || JUMP * u32::from(self.sweep.jumps(plan));
         let nodes = if plan.has_turn() {
             NODES_COUNT
         } else {
@@ -37,10 +35,10 @@ impl Planner {
             |cycles: u32| LIST_LEAST + (cycles - LIST_LEAST) * u32::from(nodes) / u32::from(NODES_COUNT);
         match self.stage {
             Stage::Walk => self.walker.cycles(plan),
-            Stage::Factor | Stage::Relax => FACTOR + jumps(FACTOR_JUMP),
-            Stage::Assemble => ASSEMBLE + jumps(ASSEMBLE_JUMP),
+            Stage::Factor | Stage::Relax => FACTOR + jumps(),
+            Stage::Assemble => ASSEMBLE + jumps(),
             Stage::Solve => of_nodes(SOLVE),
-            Stage::Reach => REACH + jumps(REACH_JUMP),
+            Stage::Reach => REACH + jumps(),
             Stage::Check if plan.knot_count > 0 => CHECK + CHECK_JUMPS,
             Stage::Check => CHECK,
             Stage::Scale if plan.has_turn() => BLEND,
