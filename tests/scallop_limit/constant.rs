@@ -489,3 +489,50 @@ fn passes_around_a_point() {
         }
     }
 }
+
+/// A wavy strip, much longer than wide, of many patches along its passes.
+fn strip(length_mm: f64, spans: usize) -> Job {
+    let knots = [
+        vec![0.0; 3],
+        (0..=spans).map(|k| k as f64).collect(),
+        vec![spans as f64; 3],
+    ]
+    .concat();
+    let rows = spans + 3;
+    let row = |i: usize| {
+        let share = i as f64 / (rows - 1) as f64;
+        let wave = (11.0 * share).sin();
+        [[0.0, 0.0], [4.0, 0.8 + 0.3 * wave], [8.0, 0.1 * wave]]
+            .map(|[y, z]| [length_mm * share, y, z, 1.0])
+            .to_vec()
+    };
+    let mut job = plane([[0.0, 0.0], [0.0, 1.0], [1.0, 0.0], [1.0, 1.0]]);
+    job.surface = SurfaceSpec::Nurbs(NurbsSpec {
+        degree: [3, 2],
+        knots_u: knots,
+        knots_v: vec![0.0, 0.0, 0.0, 1.0, 1.0, 1.0],
+        poles_mm: (0..rows).map(row).collect(),
+        rational: false,
+    });
+    (job.radius_mm, job.scallop_mm) = (3.0, 0.0066);
+    job
+}
+
+/// The passes advance everywhere on strips from 2 to 40 times as long as wide: the sum of what a front may bend was beyond what its hull holds, and stations stayed behind.
+#[test]
+fn long_narrow_strips() {
+    for length_mm in [16.0, 100.0, 160.0, 320.0] {
+        let mut job = strip(length_mm, 64);
+        job.spacing = Spacing::Exact;
+        let straight = passes(&job).len();
+        job.spacing = Spacing::Constant(Start::Edge);
+        let curved = passes(&job).len();
+        let (excess, error) = excess(&job, &measured(&job));
+        println!("{length_mm}: {straight} and {curved} passes, {excess} within {error}");
+        assert!(
+            curved <= straight + 2,
+            "{length_mm}: {curved} passes, {straight} straight ones"
+        );
+        assert!(excess <= error.max(ERROR_SHARE_MAX), "{length_mm}: {excess}");
+    }
+}

@@ -194,11 +194,13 @@ impl Curve {
         let mut best = (f64::INFINITY, range[0]);
         for index in lowest.into_iter().take(TRIED) {
             let mut found = self.newton(seeds[index], range, gap);
-            if found.0 > ON_CURVE_MM2 {
-                let beside = [index.saturating_sub(1), (index + 1).min(seeds.len() - 1)];
-                let start = self.golden(beside.map(|k| seeds[k].1), gap);
-                let other = self.newton(start, range, gap);
-                found = if other.0 < found.0 { other } else { found };
+            // On either side of the seed, because a profile turned around an axis that it crosses is folded there.
+            for beside in [index.saturating_sub(1), (index + 1).min(seeds.len() - 1)] {
+                if found.0 > ON_CURVE_MM2 {
+                    let start = self.golden([seeds[index].1, seeds[beside].1], gap);
+                    let other = self.newton(start, range, gap);
+                    found = if other.0 < found.0 { other } else { found };
+                }
             }
             best = if found.0 < best.0 { found } else { best };
             if best.0 <= ON_CURVE_MM2 {

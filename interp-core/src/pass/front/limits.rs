@@ -17,6 +17,8 @@ const TURN_BACK: f32 = 0.15;
 const HULL_BITS: u32 = 6;
 /// Greatest second difference that is added for the hull, a share of the whole side parameter.
 const BEND_MAX: f32 = 0.1;
+/// Twice the largest sum of second differences over a front, in wholes: the hull's ordinates hold 512.
+const SUM_MAX: f32 = 900.0;
 /// Members that leave the hull in one call.
 const MEMBERS_MAX: u8 = 8;
 /// Change of the front that is left as it is, units of the hull.
@@ -138,7 +140,9 @@ impl Limiter {
             let length = stations.length(job, station - 1);
             self.sum += self.slope * length;
             let turn = self.turn(table, station, length, TURN_BACK);
-            self.slope += turn.at_most(BEND_MAX / length);
+            let intervals = f32::from(stations.count().saturating_sub(1)).at_least(1.0);
+            let bend = BEND_MAX.at_most(SUM_MAX / (intervals * intervals));
+            self.slope += turn.at_most(bend / length);
         }
         let front = table.word(Column::Next, station) >> HULL_BITS;
         let scale = to_f32(WHOLE >> HULL_BITS);

@@ -277,9 +277,9 @@ impl Lookahead {
                 None => (false, true),
             };
             let wanted = u16::from(wants_before) + u16::from(wants_here && !is_kept);
-            if !self.is_on_front() && (!self.adapts || self.keeps_even || wanted > room) {
+            if !self.is_on_front() && !self.adapts {
                 // The even stations alone.
-            } else if wanted > room {
+            } else if wanted > room || self.keeps_even {
                 // The greatest on both sides instead.
                 let missed = self.missed.get_or_insert(q);
                 for q in before.iter().map(|before| &before.q).chain([&q]) {
