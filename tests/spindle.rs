@@ -266,6 +266,25 @@ fn a_run_held_because_the_host_is_gone_stands_without_it() {
     assert_eq!((desk.status().state, desk.outputs()), (State::Held, ON));
 }
 
+/// A resume that is sent again while the spindle comes up to speed waits for the rest of the time.
+#[test]
+fn a_resume_that_is_sent_twice_waits_for_the_spindle() {
+    let mut desk = Desk::ready().running();
+    desk.ask(&Request::Pause).unwrap();
+    desk.ticks(3000);
+    assert_eq!(
+        (desk.status().state, desk.outputs()),
+        (State::Held, output::DRIVES)
+    );
+    for _ in 0..3 {
+        desk.ask(&Request::Resume).unwrap();
+        desk.ticks(AT_SPEED / 4);
+        assert_eq!((desk.status().state, desk.outputs()), (State::Held, ON));
+    }
+    desk.ticks(AT_SPEED / 4);
+    assert!(matches!(desk.status().state, State::Running | State::Linking));
+}
+
 #[test]
 fn an_order_is_for_one_job_and_within_the_profile() {
     let mut desk = Desk::ready();

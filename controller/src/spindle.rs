@@ -55,7 +55,7 @@ pub(crate) struct Spindle {
     output: u32,
     /// A start or resume waits for the spindle.
     waits: bool,
-    /// Periods that the start or resume has waited.
+    /// Periods that starts and resumes have waited since the spindle was switched on.
     waited: u32,
     /// Switched on by a command outside a run.
     is_commanded: bool,
@@ -206,12 +206,10 @@ impl Spindle {
                 ..self.order
             };
             let is_on = self.now == order && !self.is_commanded;
-            // By time it is at speed, if it is on.
-            self.waited = if is_on && at_speed == AtSpeed::ByTime {
-                u32::MAX
-            } else {
-                0
-            };
+            // By time, one that is on waits for the rest of the time, or is at speed.
+            if !is_on || at_speed != AtSpeed::ByTime {
+                self.waited = 0;
+            }
             self.is_commanded = false;
             self.switch(order);
         }
