@@ -396,5 +396,17 @@ pub fn may_resume(status: &SafetyStatus) -> Result<(), Reason> {
     Err(Reason::Unsafe { fault: fault.into() })
 }
 
+/// Whether a run may go on that is held in this state, or slows down for it.
+///
+/// # Errors
+/// The door is open, or the tool slows down because the spindle is below its speed: only a resume from rest waits for it.
+pub(crate) fn may_go_on(status: &SafetyStatus, state: State) -> Result<(), Reason> {
+    may_resume(status)?;
+    if state == State::Holding && status.pause == PauseCause::BelowSpeed {
+        return Err(Reason::WrongState { state });
+    }
+    Ok(())
+}
+
 #[cfg(test)]
 mod tests;

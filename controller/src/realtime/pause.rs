@@ -8,10 +8,14 @@ use interp_core::{
 use protocol::message::{Clock, InputLines, PauseCause, Reason, Turning};
 
 use super::{RealTime, run::RunRecord};
-use crate::{safety::may_resume, spindle::Readiness};
+use crate::{
+    safety::{may_go_on, may_resume},
+    spindle::Readiness,
+};
 
 impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
-    /// A start or resume: held back until the spindle is at speed. In lockstep time is the host's, and nothing turns. A resume while the door is open is dropped.
+    /// A start or resume: held back until the spindle is at speed. In lockstep time is the host's, and nothing turns. A resume that is not
+    /// possible any more is dropped.
     #[cold]
     #[inline(never)]
     pub(super) fn with_spindle(&mut self, command: Option<Command>) -> Option<Command> {
@@ -21,8 +25,11 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         let may = if is_start {
             Command::Start.is_allowed(state) && self.may_start().is_ok()
         } else {
-            may_resume(&status).is_ok()
+            may_go_on(&status, state).is_ok()
         };
+        if !may && state == State::Holding {
+            return None;
+        }
         self.control.host_is_gone = false;
         self.control.pauses = false;
         if !may {

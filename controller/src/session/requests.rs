@@ -14,7 +14,7 @@ use super::{
 use crate::{
     machine::{Busy, Instruction, Machine},
     manual::{Motion, ProbeMove},
-    safety::{Order, may_resume},
+    safety::{Order, may_go_on},
     upload::Upload,
 };
 
@@ -211,7 +211,7 @@ impl Session {
             return Err(Reason::WrongState { state });
         }
         if command == Command::Resume {
-            may_resume(&safety)?;
+            may_go_on(&safety, state)?;
         }
         if command == Command::Start {
             if self.is_outdated {
