@@ -384,3 +384,41 @@ fn a_start_that_an_input_forbids_meanwhile_is_over() {
     desk.ticks(AT_SPEED);
     assert_eq!(desk.status().state, State::Ready);
 }
+
+/// The host is lost while a run is held: a resume that waits for the spindle is dropped, and a spindle that the operator's hold has left on is off.
+#[test]
+fn a_held_run_whose_host_is_lost_stands_without_spindle() {
+    let mut desk = Desk::ready();
+    desk.hold_after(200);
+    let mut desk = desk.running();
+    desk.ask(&Request::Pause).unwrap();
+    desk.ticks(3000);
+    desk.ask(&Request::Resume).unwrap();
+    desk.ticks(150);
+    assert_eq!((desk.status().state, desk.outputs()), (State::Held, ON));
+    desk.ticks(2 * AT_SPEED);
+    assert_eq!(
+        (desk.status().state, desk.outputs()),
+        (State::Held, output::DRIVES)
+    );
+    assert!(desk.status().safety.link_timed_out);
+    // With a host that stays the resume is carried out.
+    desk.ask(&Request::Resume).unwrap();
+    for _ in 0..4 {
+        desk.ticks(100);
+        desk.answer(&Request::Status);
+    }
+    assert!(matches!(desk.status().state, State::Running | State::Linking));
+
+    let mut desk = Desk::ready();
+    desk.hold_after(1000);
+    let mut desk = desk.running();
+    desk.ask(&Request::Hold).unwrap();
+    desk.ticks(800);
+    assert_eq!((desk.status().state, desk.outputs()), (State::Held, ON));
+    desk.ticks(300);
+    assert_eq!(
+        (desk.status().state, desk.outputs()),
+        (State::Held, output::DRIVES)
+    );
+}

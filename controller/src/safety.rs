@@ -265,8 +265,8 @@ impl Safety {
         self.ticks_to_timeout == 0
     }
 
-    /// After a tick for which [`Self::is_unchanged`] was false: whether the link timeout requires a hold now.
-    /// `holds`: whether the state accepts a hold.
+    /// After a tick for which [`Self::is_unchanged`] was false: whether the link timeout requires a hold now, or that a run that is held stands without its spindle.
+    /// `holds`: whether the state accepts a hold, or is held.
     pub(crate) fn check_link_timeout(&mut self, clock: Clock, state: State, holds: bool) -> bool {
         if self.ticks_to_timeout != 0 {
             return false;
@@ -277,7 +277,7 @@ impl Safety {
             return false;
         }
         self.status.link_timed_out = true;
-        if self.status.configuration.on_link_timeout == LinkTimeoutAction::Finish || state == State::Held {
+        if self.status.configuration.on_link_timeout == LinkTimeoutAction::Finish {
             return false;
         }
         if !holds {

@@ -85,6 +85,15 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         self.control.spindle.is_awaited() && !self.interpolator.state().is_under_way()
     }
 
+    /// The host is gone while the run is held: the spindle is off, and a resume that waits for it is dropped.
+    #[cold]
+    pub(super) fn stand_without_host(&mut self) {
+        if self.control.command == Some(Command::Resume) {
+            self.control.command = None;
+        }
+        self.control.spindle.off();
+    }
+
     /// The run has come to rest. In a hold the spindle stops after a heartbeat timeout, and if it was below its speed; else if the profile says so and the tool is above the surface or
     /// the door is open.
     #[cold]

@@ -215,7 +215,10 @@ impl Session {
             _ => self.start_job(machine, None, false),
         };
         // A refusal is not reported: there may be no host, and one that is there reads the state.
-        self.button.runs_alone |= done.is_ok();
+        if done.is_ok() {
+            self.button.runs_alone = true;
+            machine.heard();
+        }
     }
 }
 
