@@ -422,3 +422,39 @@ fn a_held_run_whose_host_is_lost_stands_without_spindle() {
         (State::Held, output::DRIVES)
     );
 }
+
+/// A hold takes back a resume that waits for the spindle; the axes' status tells that it waits.
+#[test]
+fn a_resume_that_waits_can_be_taken_back() {
+    let mut desk = Desk::ready().running();
+    desk.ask(&Request::Pause).unwrap();
+    desk.ticks(3000);
+    let held = Err(Reason::WrongState { state: State::Held });
+    assert_eq!(desk.ask(&Request::Hold), held);
+    desk.ask(&Request::Resume).unwrap();
+    desk.ticks(10);
+    assert_eq!((desk.motion().activity, desk.outputs()), (Activity::SpinUp, ON));
+    assert_eq!(desk.ask(&Request::Spindle(ORDER)), held);
+    desk.ask(&Request::Hold).unwrap();
+    desk.ticks(2 * AT_SPEED);
+    let rests = (State::Held, Activity::Rest, output::DRIVES);
+    assert_eq!(
+        (desk.status().state, desk.motion().activity, desk.outputs()),
+        rests
+    );
+    // A pause and a stop take it back, too.
+    desk.ask(&Request::Resume).unwrap();
+    desk.ticks(10);
+    desk.ask(&Request::Pause).unwrap();
+    desk.ticks(2 * AT_SPEED);
+    assert_eq!(
+        (desk.status().state, desk.motion().activity, desk.outputs()),
+        rests
+    );
+    desk.ask(&Request::Resume).unwrap();
+    desk.ticks(AT_SPEED + 2);
+    assert!(matches!(desk.status().state, State::Running | State::Linking));
+    desk.ask(&Request::Stop).unwrap();
+    desk.ticks(4000);
+    assert_eq!(desk.status().state, State::Ready);
+}

@@ -37,7 +37,7 @@ pub enum Activity {
     Approach,
     /// 6: homing: off the switch, to rest.
     Clear,
-    /// 7: a start that waits for the spindle.
+    /// 7: a start, or a resume of the run that is held, that waits for the spindle.
     SpinUp,
 }
 
