@@ -458,3 +458,34 @@ fn a_resume_that_waits_can_be_taken_back() {
     desk.ticks(4000);
     assert_eq!(desk.status().state, State::Ready);
 }
+
+/// A pause that is held on its way up: the spindle turns until the tool is above the surface, and not longer.
+#[test]
+fn a_pause_that_is_held_on_its_way_up_stops_the_spindle_at_its_end() {
+    let mut desk = Desk::ready().running();
+    for _ in 0..100 {
+        desk.ticks(50);
+        if desk.status().state == State::Running {
+            break;
+        }
+    }
+    desk.ticks(100);
+    desk.ask(&Request::Pause).unwrap();
+    while desk.status().state != State::Linking {
+        desk.ticks(1);
+    }
+    desk.ticks(10);
+    desk.ask(&Request::Hold).unwrap();
+    desk.ticks(500);
+    assert_eq!((desk.status().state, desk.outputs()), (State::Held, ON));
+    desk.ask(&Request::Resume).unwrap();
+    desk.ticks(3000);
+    assert_eq!(
+        (desk.status().state, desk.outputs()),
+        (State::Held, output::DRIVES)
+    );
+    desk.ask(&Request::Resume).unwrap();
+    assert_eq!(desk.outputs(), ON);
+    desk.ticks(AT_SPEED + 2);
+    assert!(matches!(desk.status().state, State::Running | State::Linking));
+}

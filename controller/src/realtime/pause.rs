@@ -31,7 +31,8 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
             return None;
         }
         self.control.host_is_gone = false;
-        self.control.pauses = false;
+        // A pause that was held on its way up goes on.
+        self.control.pauses &= state == State::Held && !self.interpolator.is_lifted();
         if !may {
             if self.control.spindle.is_awaited() {
                 self.control.spindle.off();
@@ -100,12 +101,14 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
     #[inline(never)]
     pub(super) fn came_to_rest(&mut self, state: State) {
         let status = self.control.safety.status();
-        let is_clear = self.interpolator.is_lifted() || status.lines.has(InputLines::DOOR);
+        let is_lifted = self.interpolator.is_lifted();
+        let is_clear = is_lifted || status.lines.has(InputLines::DOOR);
         let stops = self.control.host_is_gone
             || status.pause == PauseCause::BelowSpeed
             || (is_clear && self.control.spindle.stops_at_pause());
         self.control.host_is_gone = false;
-        self.control.pauses = false;
+        // Held on its way up, a pause is not over.
+        self.control.pauses &= state == State::Held && !is_lifted;
         if state == State::Held && stops {
             self.control.spindle.off();
         }
