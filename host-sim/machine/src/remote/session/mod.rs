@@ -161,3 +161,6 @@ impl Session {
         self.start
     }
 }
+
+#[cfg(test)]
+mod tests;
