@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex};
 
 use interp_core::State;
 use protocol::frame::{FRAME_MAX, write_reply};
-use protocol::message::{Activity, Clock, Description, MotionStatus, Reason, Status, read_request};
+use protocol::message::{Activity, Clock, Description, JogWay, MotionStatus, Reason, Status, read_request};
 
 use super::waiting::SILENCE_TIMEOUT;
 use super::*;
@@ -17,15 +17,23 @@ struct Fake {
     ready: VecDeque<u8>,
     state: State,
     activity: Activity,
+    /// Bytes that are lost on their way to the board.
+    loses: usize,
     /// Number of the last request that was carried out.
     number: u16,
     /// Its payload, and its answer.
     payload: Vec<u8>,
     answer: Vec<u8>,
+    /// Jogs that were begun.
+    jogs: u32,
 }
 
 impl Fake {
     fn receive(&mut self, byte: u8) {
+        if self.loses > 0 {
+            self.loses -= 1;
+            return;
+        }
         let decoder = self.decoder.get_or_insert_with(Decoder::new);
         let (number, request, payload) = match decoder.push(byte) {
             None => return,
@@ -75,6 +83,10 @@ impl Fake {
                     ..MotionStatus::default()
                 },
             },
+            Request::Jog { .. } => {
+                self.jogs += 1;
+                Reply::Ack { number }
+            }
             _ => Reply::Ack { number },
         };
         let from = self.ready.len();
@@ -191,5 +203,104 @@ fn a_start_that_waits_longer_than_the_silence_of_a_run_is_waited_for() {
             is_heard = session.poll().map(drop);
         }
         assert_eq!(is_heard.is_err(), is_silent, "{is_heard:?}");
+    }
+}
+
+/// Outside a run a request that was lost is repeated well within the second after which the board ends a motion or switches a spindle off.
+#[test]
+fn a_request_that_was_lost_is_repeated_before_the_host_counts_as_gone() {
+    let (mut session, fake) = open(State::Ready, Activity::Rest);
+    fake.lock().unwrap().loses = usize::MAX;
+    let loser = fake.clone();
+    std::thread::spawn(move || {
+        std::thread::sleep(Duration::from_millis(100));
+        loser.lock().unwrap().loses = 0;
+    });
+    let begin = Instant::now();
+    session.command(&Request::Home { axes: 0 }).unwrap();
+    let took = begin.elapsed();
+    assert!(took < Duration::from_millis(600), "{took:?}");
+}
+
+/// A jog for as long as a key is held is given up where it gets lost, whole or in part: it does not begin when the key was released long ago. The session goes on.
+#[test]
+fn a_jog_by_key_that_was_lost_is_given_up() {
+    let jog = Request::Jog {
+        way: JogWay::Towards { signs: [1, 0, 0] },
+        speed_mm_s: 1.0,
+    };
+    let length = protocol::frame::write_request(2, &jog, &mut [0; FRAME_MAX])
+        .unwrap()
+        .len();
+    for lost_from in [0, length - 1] {
+        let (mut session, fake) = open(State::Ready, Activity::Rest);
+        // The line is dead from this byte on, for longer than a key's repetition.
+        let dead = Arc::new(Mutex::new(lost_from));
+        session.stream = Box::new(Dies(session.stream, dead.clone()));
+        let begin = Instant::now();
+        assert!(session.command(&jog).is_err());
+        assert!(begin.elapsed() < Duration::from_millis(250));
+        *dead.lock().unwrap() = usize::MAX;
+        session.motion().unwrap();
+        assert_eq!(fake.lock().unwrap().jogs, 0, "{lost_from}");
+        session.command(&jog).unwrap();
+        assert_eq!(fake.lock().unwrap().jogs, 1);
+    }
+    // Where only its answer was lost, the board expects the next number.
+    let (mut session, fake) = open(State::Ready, Activity::Rest);
+    session.stream = Box::new(Deaf(session.stream, Instant::now() + Duration::from_millis(180)));
+    assert!(session.command(&jog).is_err());
+    session.motion().unwrap();
+    session.command(&jog).unwrap();
+    assert_eq!(fake.lock().unwrap().jogs, 2);
+}
+
+/// A line that loses what the host sends after this number of bytes.
+struct Dies(Box<dyn Stream>, Arc<Mutex<usize>>);
+
+impl Stream for Dies {}
+
+impl Read for Dies {
+    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        self.0.read(bytes)
+    }
+}
+
+impl Write for Dies {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let mut left = self.1.lock().unwrap();
+        let count = bytes.len().min(*left);
+        *left -= count;
+        self.0.write_all(&bytes[..count])?;
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+/// A line that loses what the board sends until some time.
+struct Deaf(Box<dyn Stream>, Instant);
+
+impl Stream for Deaf {}
+
+impl Read for Deaf {
+    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        let count = self.0.read(bytes)?;
+        if Instant::now() < self.1 {
+            return Err(io::ErrorKind::WouldBlock.into());
+        }
+        Ok(count)
+    }
+}
+
+impl Write for Deaf {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
     }
 }
