@@ -1,7 +1,7 @@
 //! Spindle and coolant: those of a job from the start of a run to its end, those of a command outside a run for as long as the host is heard.
 //!
 //! A start or resume on a free clock waits until the spindle is at speed, by time or by its contact; a contact that is silent for the whole time is a fault. Every end of a
-//! run switches off: finished, stopped, aborted, a fault, the drives off. So does a run that is held because the host is gone; its resume switches on again and waits. A contact
+//! run switches off: finished, stopped, aborted, a fault, the drives off. So does a run that is held because the host is gone, or while it is held; its resume switches on again and waits. A contact
 //! that opens in a run for [`BELOW_TICKS`] pauses it.
 
 use protocol::message::{AtSpeed, InputLines, PWM_STEPS, Reason, SpindleOrder, SpindleSettings, Turning};
