@@ -9,7 +9,9 @@ use interp_core::{RunStart, Sample, SpanParameter, State, steps::AxisSteps, step
 use job::{Job, Pattern};
 use machine::prepare::{Prepared, prepare};
 use protocol::digest::job_digest;
-use protocol::message::{JobName, Journal, Offsets, Profile, Reason, Reply, Request, Status, job_mark};
+use protocol::message::{
+    InputLines, JobName, Journal, Offsets, Profile, Reason, Reply, Request, Status, job_mark,
+};
 
 use crate::pause::sample_job;
 
@@ -422,6 +424,33 @@ fn a_place_is_of_the_job_and_the_profile_that_ran() {
     check(bench, journal);
 }
 
+/// A supply that falls some time after the end of a run leaves the record of that end: the drives may have let go before the board noticed it.
+#[test]
+fn a_supply_that_falls_after_a_run_leaves_the_place_of_its_end() {
+    let job = sample_job("torus", Pattern::Zigzag, 0.0, None);
+    let prepared = prepare(&job).unwrap();
+    for after in [0, 60, 120, 300] {
+        let mut bench = Bench::loaded(&prepared, profile(&job));
+        bench.ask(&Request::Start);
+        while bench.trail.iter().filter(|sample| sample.pass == 1).count() < 500 {
+            bench.tick();
+        }
+        bench.board.simulate(InputLines::EMERGENCY_STOP);
+        bench.rest();
+        assert_eq!(bench.board.status().state, State::Faulted);
+        let journal = bench.journal();
+        assert!(journal.unwrap().start().within().is_some());
+        for _ in 0..after {
+            bench.tick();
+        }
+        assert_eq!(
+            bench.cut(true).journal(),
+            journal,
+            "{after} periods after the run"
+        );
+    }
+}
+
 /// With a full journal a run is not noted: a place of an earlier one is none of it, and the new workpiece is not resumed after passes that it never saw.
 #[test]
 fn a_run_that_a_full_journal_cannot_note_is_not_resumed_at_an_earlier_ones_place() {
@@ -480,7 +509,8 @@ fn a_run_that_a_full_journal_cannot_note_is_not_resumed_at_an_earlier_ones_place
         panic!("{:?}", bench.board.status());
     };
     assert_eq!(reason, Reason::NothingToResume);
-    // Switched on anew, the board journals again.
+    // Switched on anew, the board journals again. The job was stored with other offsets.
+    bench.ask(&Request::SetOffsets(Offsets::NONE));
     let name = JobName::try_from("left").unwrap();
     bench.ask(&Request::StartJob { name, resumes: false });
     bench.run(1_000);

@@ -266,6 +266,25 @@ fn a_run_held_because_the_host_is_gone_stands_without_it() {
     assert_eq!((desk.status().state, desk.outputs()), (State::Held, ON));
 }
 
+/// A resume that is sent again while the spindle comes up to speed waits for the rest of the time.
+#[test]
+fn a_resume_that_is_sent_twice_waits_for_the_spindle() {
+    let mut desk = Desk::ready().running();
+    desk.ask(&Request::Pause).unwrap();
+    desk.ticks(3000);
+    assert_eq!(
+        (desk.status().state, desk.outputs()),
+        (State::Held, output::DRIVES)
+    );
+    for _ in 0..3 {
+        desk.ask(&Request::Resume).unwrap();
+        desk.ticks(AT_SPEED / 4);
+        assert_eq!((desk.status().state, desk.outputs()), (State::Held, ON));
+    }
+    desk.ticks(AT_SPEED / 4);
+    assert!(matches!(desk.status().state, State::Running | State::Linking));
+}
+
 #[test]
 fn an_order_is_for_one_job_and_within_the_profile() {
     let mut desk = Desk::ready();
@@ -364,4 +383,109 @@ fn a_start_that_an_input_forbids_meanwhile_is_over() {
     desk.board.simulate(InputLines::NONE);
     desk.ticks(AT_SPEED);
     assert_eq!(desk.status().state, State::Ready);
+}
+
+/// The host is lost while a run is held: a resume that waits for the spindle is dropped, and a spindle that the operator's hold has left on is off.
+#[test]
+fn a_held_run_whose_host_is_lost_stands_without_spindle() {
+    let mut desk = Desk::ready();
+    desk.hold_after(200);
+    let mut desk = desk.running();
+    desk.ask(&Request::Pause).unwrap();
+    desk.ticks(3000);
+    desk.ask(&Request::Resume).unwrap();
+    desk.ticks(150);
+    assert_eq!((desk.status().state, desk.outputs()), (State::Held, ON));
+    desk.ticks(2 * AT_SPEED);
+    assert_eq!(
+        (desk.status().state, desk.outputs()),
+        (State::Held, output::DRIVES)
+    );
+    assert!(desk.status().safety.link_timed_out);
+    // With a host that stays the resume is carried out.
+    desk.ask(&Request::Resume).unwrap();
+    for _ in 0..4 {
+        desk.ticks(100);
+        desk.answer(&Request::Status);
+    }
+    assert!(matches!(desk.status().state, State::Running | State::Linking));
+
+    let mut desk = Desk::ready();
+    desk.hold_after(1000);
+    let mut desk = desk.running();
+    desk.ask(&Request::Hold).unwrap();
+    desk.ticks(800);
+    assert_eq!((desk.status().state, desk.outputs()), (State::Held, ON));
+    desk.ticks(300);
+    assert_eq!(
+        (desk.status().state, desk.outputs()),
+        (State::Held, output::DRIVES)
+    );
+}
+
+/// A hold takes back a resume that waits for the spindle; the axes' status tells that it waits.
+#[test]
+fn a_resume_that_waits_can_be_taken_back() {
+    let mut desk = Desk::ready().running();
+    desk.ask(&Request::Pause).unwrap();
+    desk.ticks(3000);
+    let held = Err(Reason::WrongState { state: State::Held });
+    assert_eq!(desk.ask(&Request::Hold), held);
+    desk.ask(&Request::Resume).unwrap();
+    desk.ticks(10);
+    assert_eq!((desk.motion().activity, desk.outputs()), (Activity::SpinUp, ON));
+    assert_eq!(desk.ask(&Request::Spindle(ORDER)), held);
+    desk.ask(&Request::Hold).unwrap();
+    desk.ticks(2 * AT_SPEED);
+    let rests = (State::Held, Activity::Rest, output::DRIVES);
+    assert_eq!(
+        (desk.status().state, desk.motion().activity, desk.outputs()),
+        rests
+    );
+    // A pause and a stop take it back, too.
+    desk.ask(&Request::Resume).unwrap();
+    desk.ticks(10);
+    desk.ask(&Request::Pause).unwrap();
+    desk.ticks(2 * AT_SPEED);
+    assert_eq!(
+        (desk.status().state, desk.motion().activity, desk.outputs()),
+        rests
+    );
+    desk.ask(&Request::Resume).unwrap();
+    desk.ticks(AT_SPEED + 2);
+    assert!(matches!(desk.status().state, State::Running | State::Linking));
+    desk.ask(&Request::Stop).unwrap();
+    desk.ticks(4000);
+    assert_eq!(desk.status().state, State::Ready);
+}
+
+/// A pause that is held on its way up: the spindle turns until the tool is above the surface, and not longer.
+#[test]
+fn a_pause_that_is_held_on_its_way_up_stops_the_spindle_at_its_end() {
+    let mut desk = Desk::ready().running();
+    for _ in 0..100 {
+        desk.ticks(50);
+        if desk.status().state == State::Running {
+            break;
+        }
+    }
+    desk.ticks(100);
+    desk.ask(&Request::Pause).unwrap();
+    while desk.status().state != State::Linking {
+        desk.ticks(1);
+    }
+    desk.ticks(10);
+    desk.ask(&Request::Hold).unwrap();
+    desk.ticks(500);
+    assert_eq!((desk.status().state, desk.outputs()), (State::Held, ON));
+    desk.ask(&Request::Resume).unwrap();
+    desk.ticks(3000);
+    assert_eq!(
+        (desk.status().state, desk.outputs()),
+        (State::Held, output::DRIVES)
+    );
+    desk.ask(&Request::Resume).unwrap();
+    assert_eq!(desk.outputs(), ON);
+    desk.ticks(AT_SPEED + 2);
+    assert!(matches!(desk.status().state, State::Running | State::Linking));
 }

@@ -5,8 +5,8 @@ use job::Pattern;
 use machine::prepare::prepare;
 use protocol::digest::job_digest;
 use protocol::message::{
-    AtSpeed, InputLines, JobName, LinkTimeoutAction, Reason, Reply, Request, SpindleOrder, SpindleSettings,
-    StoredJobInfo, Turning, job_mark,
+    AtSpeed, InputLines, JobName, LinkTimeoutAction, Offsets, Reason, Reply, Request, SpindleOrder,
+    SpindleSettings, StoredJobInfo, Turning, job_mark,
 };
 
 use crate::pause::sample_job;
@@ -237,4 +237,48 @@ fn the_start_button_needs_no_host_while_the_spindle_comes_up_to_speed() {
     );
     assert_ne!(status.state, State::Held);
     assert_eq!(bench.run(u32::MAX), State::Finished);
+}
+
+/// A stored job was placed by the offsets that the board kept then: with others, a tool of another length for instance, it is refused, and one that was loaded before them is
+/// not stored any more.
+#[test]
+fn a_stored_job_does_not_start_with_other_offsets() {
+    let (mut bench, job) = bench();
+    let home_nm = bench.home();
+    let longer = Offsets {
+        tool_nm: 12_000_000,
+        ..Offsets::NONE
+    };
+    bench.ask(&Request::SetOffsets(longer));
+    for resumes in [false, true] {
+        assert!(matches!(
+            refused(&mut bench, &start("left", resumes)),
+            Reason::OtherProfile | Reason::NothingToResume
+        ));
+    }
+    assert_eq!(refused(&mut bench, &start("left", false)), Reason::OtherProfile);
+    press(&mut bench);
+    assert_eq!(bench.board.status().samples, 0);
+    // The same offsets as when it was stored.
+    bench.ask(&Request::SetOffsets(Offsets::NONE));
+    bench.ask(&start("left", false));
+    bench.run(100);
+    assert!(bench.board.status().state.is_under_way());
+    bench.ask(&Request::Abort);
+    while bench.board.status().state != State::Ready {
+        bench.tick();
+    }
+    // Loaded before the offsets.
+    bench.load(&prepare(&job).unwrap(), home_nm);
+    bench.ask(&Request::SetOffsets(longer));
+    let store = Request::StoreJob {
+        name: name("right"),
+        begins_anywhere: true,
+    };
+    assert_eq!(refused(&mut bench, &store), Reason::OtherProfile);
+    bench.load(&prepare(&job).unwrap(), home_nm);
+    bench.ask(&store);
+    let home_nm = bench.home();
+    bench.load(&prepare(&job).unwrap(), home_nm);
+    bench.ask(&start("right", false));
 }

@@ -75,6 +75,11 @@ impl Journalling {
         self.places = [second, third, place.or(third)];
     }
 
+    /// The run has ended: its place does not come nearer any more. The drives may have let go before the board noticed the end.
+    pub(crate) fn freeze(&mut self) {
+        self.places = [self.place(); PLACES];
+    }
+
     /// The place up to which the run is complete for certain.
     pub(crate) const fn place(&self) -> Option<RunStart> {
         let [oldest, ..] = self.places;

@@ -269,14 +269,19 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
             self.control.spindle.off();
         }
         let state = self.interpolator.state();
-        let holds = self.control.command.is_none() && Command::Hold.is_allowed(state);
+        let is_held = state == State::Held;
+        let holds = is_held || (self.control.command.is_none() && Command::Hold.is_allowed(state));
         if self
             .control
             .safety
             .check_link_timeout(self.control.clock, state, holds)
         {
-            self.control.command = Some(Command::Hold);
-            self.control.host_is_gone = true;
+            if is_held {
+                self.stand_without_host();
+            } else {
+                self.control.command = Some(Command::Hold);
+                self.control.host_is_gone = true;
+            }
         }
     }
 

@@ -265,8 +265,8 @@ impl Safety {
         self.ticks_to_timeout == 0
     }
 
-    /// After a tick for which [`Self::is_unchanged`] was false: whether the link timeout requires a hold now.
-    /// `holds`: whether the state accepts a hold.
+    /// After a tick for which [`Self::is_unchanged`] was false: whether the link timeout requires a hold now, or that a run that is held stands without its spindle.
+    /// `holds`: whether the state accepts a hold, or is held.
     pub(crate) fn check_link_timeout(&mut self, clock: Clock, state: State, holds: bool) -> bool {
         if self.ticks_to_timeout != 0 {
             return false;
@@ -277,7 +277,7 @@ impl Safety {
             return false;
         }
         self.status.link_timed_out = true;
-        if self.status.configuration.on_link_timeout == LinkTimeoutAction::Finish || state == State::Held {
+        if self.status.configuration.on_link_timeout == LinkTimeoutAction::Finish {
             return false;
         }
         if !holds {
@@ -394,6 +394,18 @@ pub fn may_resume(status: &SafetyStatus) -> Result<(), Reason> {
     }
     let fault = Fault::new(FaultKind::DoorOpen, f32::from(InputLines::DOOR.0));
     Err(Reason::Unsafe { fault: fault.into() })
+}
+
+/// Whether a run may go on that is held in this state, or slows down for it.
+///
+/// # Errors
+/// The door is open, or the tool slows down because the spindle is below its speed: only a resume from rest waits for it.
+pub(crate) fn may_go_on(status: &SafetyStatus, state: State) -> Result<(), Reason> {
+    may_resume(status)?;
+    if state == State::Holding && status.pause == PauseCause::BelowSpeed {
+        return Err(Reason::WrongState { state });
+    }
+    Ok(())
 }
 
 #[cfg(test)]

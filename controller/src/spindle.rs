@@ -1,7 +1,7 @@
 //! Spindle and coolant: those of a job from the start of a run to its end, those of a command outside a run for as long as the host is heard.
 //!
 //! A start or resume on a free clock waits until the spindle is at speed, by time or by its contact; a contact that is silent for the whole time is a fault. Every end of a
-//! run switches off: finished, stopped, aborted, a fault, the drives off. So does a run that is held because the host is gone; its resume switches on again and waits. A contact
+//! run switches off: finished, stopped, aborted, a fault, the drives off. So does a run that is held because the host is gone, or while it is held; its resume switches on again and waits. A contact
 //! that opens in a run for [`BELOW_TICKS`] pauses it.
 
 use protocol::message::{AtSpeed, InputLines, PWM_STEPS, Reason, SpindleOrder, SpindleSettings, Turning};
@@ -55,7 +55,7 @@ pub(crate) struct Spindle {
     output: u32,
     /// A start or resume waits for the spindle.
     waits: bool,
-    /// Periods that the start or resume has waited.
+    /// Periods that starts and resumes have waited since the spindle was switched on.
     waited: u32,
     /// Switched on by a command outside a run.
     is_commanded: bool,
@@ -206,12 +206,10 @@ impl Spindle {
                 ..self.order
             };
             let is_on = self.now == order && !self.is_commanded;
-            // By time it is at speed, if it is on.
-            self.waited = if is_on && at_speed == AtSpeed::ByTime {
-                u32::MAX
-            } else {
-                0
-            };
+            // By time, one that is on waits for the rest of the time, or is at speed.
+            if !is_on || at_speed != AtSpeed::ByTime {
+                self.waited = 0;
+            }
             self.is_commanded = false;
             self.switch(order);
         }

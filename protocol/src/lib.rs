@@ -61,7 +61,7 @@
 //! | a job that exceeds the board's profile, or other steps than the profile's | `Nak`, `BeyondProfile` with the value | |
 //! | a profile with an invalid value, or with more steps than a period holds | `Nak`, `BadProfile` | |
 //! | a profile that cannot be kept | `Nak`, `Storage` | |
-//! | a start of a job that was loaded under another profile | `Nak`, `OtherProfile` | |
+//! | a start of a job that was loaded under another profile, or placed (and perhaps stored) with other offsets | `Nak`, `OtherProfile` | |
 //! | a start of a job without axis limits, on a board with drives that has to be homed | `Nak`, `NoLimits` | |
 //! | a start, an order or settings while the axes move outside a job | `Nak`, `Moving` | |
 //! | a jog, homing or probe move on a board without a profile | `Nak`, `NoProfile` | |

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::safety::InputLines;
+use crate::{frame::crc32, safety::InputLines};
 
 /// How far a jog goes, in a straight line of all axes that move.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -37,7 +37,7 @@ pub enum Activity {
     Approach,
     /// 6: homing: off the switch, to rest.
     Clear,
-    /// 7: a start that waits for the spindle.
+    /// 7: a start, or a resume of the run that is held, that waits for the spindle.
     SpinUp,
 }
 
@@ -224,6 +224,13 @@ impl Offsets {
         work_nm: [[0; 3]; WORK_OFFSETS],
         tool_nm: 0,
     };
+
+    /// Digest of every value, never that of blank flash.
+    #[must_use]
+    pub fn digest(&self) -> u32 {
+        let mut bytes = [0; OFFSETS_BYTES_MAX];
+        crc32(self.write(&mut bytes)).min(u32::MAX - 1)
+    }
 
     /// Machine coordinates of the origin of work offset `index` (from 0) with the present tool, nm.
     #[must_use]

@@ -127,7 +127,7 @@ pub enum Reason {
     BadProfile,
     /// 22: the board cannot write its settings: they are as before.
     Storage,
-    /// 23: the job was loaded under another profile, and has to be loaded again.
+    /// 23: the job was loaded under another profile, or placed by other offsets, and has to be loaded or stored again.
     OtherProfile,
     /// 24: a job without axis limits, on a board with drives: it would begin with a jump of the position and without a ramp.
     NoLimits,
@@ -366,7 +366,10 @@ impl fmt::Display for Reason {
                 "a value of the profile is out of range, or an axis is too fast for its steps"
             ),
             Self::Storage => write!(formatter, "the board cannot write its settings"),
-            Self::OtherProfile => write!(formatter, "the job was loaded under another profile"),
+            Self::OtherProfile => write!(
+                formatter,
+                "the job was loaded under another profile, or placed by other offsets"
+            ),
             Self::NoLimits => write!(
                 formatter,
                 "the job has no axis limits, and the board has drives: they would jump to its first point"

@@ -29,6 +29,9 @@ pub struct StoredJob {
     pub spindle: SpindleOrder,
     /// Runs begin where the axes stand, not at the job's home.
     pub begins_anywhere: bool,
+    /// [`crate::message::Offsets::digest`] of the offsets that placed the job. Of a job that an earlier firmware has stored these bytes are blank flash, which is the digest of no offsets.
+    #[serde(with = "postcard::fixint::le")]
+    pub offsets: u32,
 }
 
 /// Bytes of a [`StoredJob`], at most.
@@ -50,13 +53,16 @@ impl StoredJob {
         let (words, bytes) = postcard::take_from_bytes(bytes).ok()?;
         let (digest, bytes) = bytes.split_first_chunk()?;
         let (spindle, bytes) = postcard::take_from_bytes(bytes).ok()?;
+        let (begins_anywhere, bytes) = postcard::take_from_bytes(bytes).ok()?;
+        let (offsets, _) = bytes.split_first_chunk()?;
         Some(Self {
             name,
             header,
             words,
             digest: u64::from_le_bytes(*digest),
             spindle,
-            begins_anywhere: postcard::from_bytes(bytes).ok()?,
+            begins_anywhere,
+            offsets: u32::from_le_bytes(*offsets),
         })
     }
 }
@@ -114,9 +120,14 @@ mod tests {
                 coolant: true,
             },
             begins_anywhere: true,
+            offsets: 7,
         };
         let mut bytes = [0; STORED_JOB_BYTES_MAX];
-        let written = job.write(&mut bytes).unwrap();
-        assert_eq!(StoredJob::read(written), Some(job));
+        let length = job.write(&mut bytes).unwrap().len();
+        assert_eq!(StoredJob::read(&bytes), Some(job.clone()));
+        // Without its offsets, as an earlier firmware has stored it in blank flash.
+        bytes[length - 4..].fill(0xff);
+        let offsets = u32::MAX;
+        assert_eq!(StoredJob::read(&bytes), Some(StoredJob { offsets, ..job }));
     }
 }

@@ -144,3 +144,24 @@ fn an_open_door_pauses_the_run_and_lets_nothing_resume_it() {
     });
     assert!(is_refused(refused));
 }
+
+/// A resume while the tool slows down for a spindle that fell below its speed is refused: the pause goes on.
+#[test]
+fn a_spindle_below_its_speed_is_not_resumed_while_the_tool_slows_down() {
+    let mut desk = with_contact().turning();
+    desk.board.simulate(InputLines::NONE);
+    while desk.status().safety.pause == PauseCause::None {
+        desk.ticks(1);
+    }
+    desk.ticks(1);
+    let state = State::Holding;
+    assert_eq!(desk.status().state, state);
+    assert_eq!(desk.ask(&Request::Resume), Err(Reason::WrongState { state }));
+    desk.ticks(3000);
+    let status = desk.status();
+    assert_eq!(
+        (status.state, status.safety.pause, desk.outputs()),
+        (State::Held, PauseCause::BelowSpeed, output::DRIVES)
+    );
+    assert!(desk.motion_z() >= 40_000_000);
+}

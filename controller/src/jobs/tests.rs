@@ -80,6 +80,7 @@ fn job(name: &str, words: &[i32]) -> StoredJob {
         digest: job_digest(words),
         spindle: SpindleOrder::OFF,
         begins_anywhere: true,
+        offsets: 7,
     }
 }
 

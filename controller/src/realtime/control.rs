@@ -118,7 +118,11 @@ impl Control {
     /// a change of the clock before the end of a `Run` was reported.
     pub(super) fn obey(&mut self, instruction: Instruction) -> bool {
         self.obeyed = true;
-        if matches!(instruction, Instruction::Command(_)) {
+        if let Instruction::Command(command) = instruction {
+            // Taken back by a hold, a resume leaves the spindle as it was.
+            if command == Command::Hold && self.spindle.is_awaited() {
+                self.spindle.off();
+            }
             self.spindle.stop_waiting();
         }
         match instruction {

@@ -8,10 +8,14 @@ use interp_core::{
 use protocol::message::{Clock, InputLines, PauseCause, Reason, Turning};
 
 use super::{RealTime, run::RunRecord};
-use crate::{safety::may_resume, spindle::Readiness};
+use crate::{
+    safety::{may_go_on, may_resume},
+    spindle::Readiness,
+};
 
 impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
-    /// A start or resume: held back until the spindle is at speed. In lockstep time is the host's, and nothing turns. A resume while the door is open is dropped.
+    /// A start or resume: held back until the spindle is at speed. In lockstep time is the host's, and nothing turns. A resume that is not
+    /// possible any more is dropped.
     #[cold]
     #[inline(never)]
     pub(super) fn with_spindle(&mut self, command: Option<Command>) -> Option<Command> {
@@ -21,10 +25,14 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         let may = if is_start {
             Command::Start.is_allowed(state) && self.may_start().is_ok()
         } else {
-            may_resume(&status).is_ok()
+            may_go_on(&status, state).is_ok()
         };
+        if !may && state == State::Holding {
+            return None;
+        }
         self.control.host_is_gone = false;
-        self.control.pauses = false;
+        // A pause that was held on its way up goes on.
+        self.control.pauses &= state == State::Held && !self.interpolator.is_lifted();
         if !may {
             if self.control.spindle.is_awaited() {
                 self.control.spindle.off();
@@ -78,18 +86,29 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         self.control.spindle.is_awaited() && !self.interpolator.state().is_under_way()
     }
 
+    /// The host is gone while the run is held: the spindle is off, and a resume that waits for it is dropped.
+    #[cold]
+    pub(super) fn stand_without_host(&mut self) {
+        if self.control.command == Some(Command::Resume) {
+            self.control.command = None;
+        }
+        self.control.spindle.off();
+    }
+
     /// The run has come to rest. In a hold the spindle stops after a heartbeat timeout, and if it was below its speed; else if the profile says so and the tool is above the surface or
     /// the door is open.
     #[cold]
     #[inline(never)]
     pub(super) fn came_to_rest(&mut self, state: State) {
         let status = self.control.safety.status();
-        let is_clear = self.interpolator.is_lifted() || status.lines.has(InputLines::DOOR);
+        let is_lifted = self.interpolator.is_lifted();
+        let is_clear = is_lifted || status.lines.has(InputLines::DOOR);
         let stops = self.control.host_is_gone
             || status.pause == PauseCause::BelowSpeed
             || (is_clear && self.control.spindle.stops_at_pause());
         self.control.host_is_gone = false;
-        self.control.pauses = false;
+        // Held on its way up, a pause is not over.
+        self.control.pauses &= state == State::Held && !is_lifted;
         if state == State::Held && stops {
             self.control.spindle.off();
         }

@@ -64,7 +64,7 @@ impl<S: AsRef<[i32]> + AsMut<[i32]>> RealTime<S> {
         let motion = self.control.manual.status();
         let stands_nm = self.interpolator.stands_nm();
         MotionStatus {
-            activity: if self.spins_up() {
+            activity: if self.control.spindle.is_awaited() {
                 Activity::SpinUp
             } else {
                 motion.activity

@@ -71,6 +71,9 @@ impl Session {
         begins_anywhere: bool,
     ) -> Result<(), Reason> {
         no_run(machine)?;
+        if self.is_outdated {
+            return Err(Reason::OtherProfile);
+        }
         if name.is_empty() {
             return Err(Reason::NoStoredJob);
         }
@@ -105,6 +108,7 @@ impl Session {
             digest,
             spindle: self.spindle,
             begins_anywhere,
+            offsets: offsets_of(machine),
         };
         let room = machine.jobs().room();
         if words > room {
@@ -157,6 +161,9 @@ impl Session {
         let mut found = machine.jobs().job(place);
         // Not moved out of the option: that would be a second copy on the stack.
         let job = found.as_mut().ok_or(Reason::NoStoredJob)?;
+        if job.offsets != offsets_of(machine) {
+            return Err(Reason::OtherProfile);
+        }
         if let Some(axes) = &mut job.header.axes
             && job.begins_anywhere
         {
@@ -215,8 +222,17 @@ impl Session {
             _ => self.start_job(machine, None, false),
         };
         // A refusal is not reported: there may be no host, and one that is there reads the state.
-        self.button.runs_alone |= done.is_ok();
+        if done.is_ok() {
+            self.button.runs_alone = true;
+            machine.heard();
+        }
     }
+}
+
+/// Digest of the offsets that the board keeps.
+#[inline(never)]
+fn offsets_of(machine: &mut impl Machine) -> u32 {
+    machine.offsets().digest()
 }
 
 /// The mark of a stored job.

@@ -50,6 +50,7 @@ impl Session {
             self.journalling.note(self.journal(at_start(status.pass), true));
         } else if !status.state.is_under_way() {
             // Its last pass is complete up to a place, or not known to be.
+            self.journalling.freeze();
             let place = self.journalling.place();
             self.journalling
                 .note(place.and_then(|place| self.journal(place, false)));

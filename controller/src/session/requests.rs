@@ -1,6 +1,6 @@
 //! The requests of a session, carried out.
 
-use interp_core::{RunStart, command::Command, job::Header};
+use interp_core::{RunStart, command::Command, job::Header, sample::State};
 use protocol::message::{
     Activity, Clock, Excess, OVERRIDE_MAX_PERCENT, ProfileLimit, Reason, Reply, Request, SpindleOrder,
     Status, job_mark,
@@ -14,7 +14,7 @@ use super::{
 use crate::{
     machine::{Busy, Instruction, Machine},
     manual::{Motion, ProbeMove},
-    safety::{Order, may_resume},
+    safety::{Order, may_go_on},
     upload::Upload,
 };
 
@@ -69,8 +69,8 @@ impl Session {
         machine: &mut impl Machine,
         out: &mut impl FnMut(&[u8]),
     ) -> Result<(), Reason> {
-        if needs_rest(request) && machine.motion().activity != Activity::Rest {
-            return Err(Reason::Moving);
+        if needs_rest(request) {
+            no_motion(machine)?;
         }
         if is_of_start(request) && (self.command_waits(machine) || machine.start_waits()) {
             return Err(Reason::Busy);
@@ -203,15 +203,17 @@ impl Session {
             command,
             Command::Hold | Command::Stop | Command::Abort | Command::Pause
         );
-        if ends && machine.motion().activity != Activity::Rest {
+        let activity = machine.motion().activity;
+        let Status { state, safety, .. } = machine.status();
+        if ends && activity != Activity::Rest && !state.is_under_way() {
             return machine.order(Order::Move(Motion::Stop));
         }
-        let Status { state, safety, .. } = machine.status();
-        if !command.is_allowed(state) {
+        let takes_back = command == Command::Hold && state == State::Held && activity == Activity::SpinUp;
+        if !command.is_allowed(state) && !takes_back {
             return Err(Reason::WrongState { state });
         }
         if command == Command::Resume {
-            may_resume(&safety)?;
+            may_go_on(&safety, state)?;
         }
         if command == Command::Start {
             if self.is_outdated {
@@ -280,6 +282,15 @@ pub(super) fn no_run(machine: &mut impl Machine) -> Result<(), Reason> {
         return Err(Reason::WrongState { state });
     }
     Ok(())
+}
+
+/// Refuses while the axes move outside a job, or a start waits for the spindle. What a resume that waits refuses, the run under way does.
+#[inline(never)]
+fn no_motion(machine: &mut impl Machine) -> Result<(), Reason> {
+    if machine.motion().activity == Activity::Rest || machine.status().state.is_under_way() {
+        return Ok(());
+    }
+    Err(Reason::Moving)
 }
 
 fn set_override(machine: &mut impl Machine, percent: u8) -> Result<(), Reason> {

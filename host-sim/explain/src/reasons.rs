@@ -214,11 +214,11 @@ pub(super) const ENTRIES: [Entry; 39] = [
     reason(
         23,
         "other-profile",
-        "The job was loaded under another machine profile.",
+        "The job was loaded under another machine profile, or placed by other work offsets or another tool length.",
         "None.",
-        "The profile was changed after the job was loaded, and the job was checked against the old one.",
-        "Load the job again: `cargo sim run`.",
-        "`cargo sim settings --machine FILE` between the upload and the start of a job.",
+        "The profile or the offsets were changed after the job was loaded, and it was checked against the old ones; or the offsets were changed after it was stored, or an earlier firmware has stored it, without them.",
+        "Load the job again: `cargo sim run`; store it again with `--store NAME`.",
+        "`cargo sim settings --machine FILE` between the upload and the start of a job; a longer tool, and the start button.",
     ),
     reason(
         24,

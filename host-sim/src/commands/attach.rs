@@ -42,8 +42,9 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
 pub(super) fn to_port(port: &str, job: Option<&Path>, as_json: bool) -> Result<()> {
     let job = job.map(load).transpose()?;
     let mut session = run::open_port(port)?;
+    let spins_up = session.spins_up()?;
     let status = session.status()?;
-    if !status.state.is_under_way() {
+    if !spins_up && !status.state.is_under_way() {
         let board = session.capabilities().description.board.clone();
         if as_json {
             say!("{}", json_of(&status, &board));

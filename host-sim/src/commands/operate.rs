@@ -2,7 +2,7 @@
 
 use clap::{Args, Parser, Subcommand};
 use interp_core::Command;
-use protocol::message::{OVERRIDE_MAX_PERCENT, Request, Status};
+use protocol::message::{Activity, OVERRIDE_MAX_PERCENT, Request, Status};
 use serde_json::json;
 
 use super::out::{say, to_stderr};
@@ -218,6 +218,9 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         }
     } else {
         print(&status, &board);
+        if motion.activity == Activity::SpinUp {
+            say!("  a start or resume waits for the spindle");
+        }
         // All of them or none: the sentences say so.
         if axes::is_homed_in_part(&motion) {
             say!("  {}", axes::homed_words(&motion));

@@ -15,6 +15,9 @@ const KEEP_ALIVES: u32 = 4;
 /// Interval of status requests during a run with an operator, without a heartbeat timeout.
 const ASKED: Duration = Duration::from_secs(2);
 
+/// A command is taken up with the next period; a serial line is no faster than that, QEMU's socket may be.
+const TAKEN_UP: Duration = Duration::from_millis(2);
+
 /// Setup of a board before a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Setup {
@@ -170,7 +173,7 @@ pub const fn cause(cause: PauseCause) -> &'static str {
     }
 }
 
-/// Follows the run that is under way on a board to its end, whoever started it: keeps its heartbeat, and forwards the commands of the operator. `each` is called
+/// Follows the run that is under way on a board, or whose start waits for the spindle, to its end, whoever started it: keeps its heartbeat, and forwards the commands of the operator. `each` is called
 /// with its events, the end excepted. Returns the last status, at once where no run is under way.
 ///
 /// # Errors
@@ -181,8 +184,10 @@ pub fn follow(
     mut each: impl FnMut(&Event),
 ) -> Result<Status, RemoteError> {
     keep_alive(session)?;
+    // Before the status: what waits now may be under way then.
+    let spins_up = session.spins_up()?;
     let status = session.begin_run()?;
-    if !status.state.is_under_way() {
+    if !spins_up && !status.state.is_under_way() {
         return Ok(status);
     }
     let mut following = Following::new(session, Some(operator))?;
@@ -214,7 +219,9 @@ pub fn start_stored(session: &mut Session, name: &JobName, resumes: bool) -> Res
     session.command(&Request::StartJob {
         name: name.clone(),
         resumes,
-    })
+    })?;
+    std::thread::sleep(TAKEN_UP);
+    Ok(())
 }
 
 /// Does it, and says how it is going then.
@@ -224,8 +231,7 @@ pub fn start_stored(session: &mut Session, name: &JobName, resumes: bool) -> Res
 pub fn act(session: &mut Session, request: &Request) -> Result<Status, RemoteError> {
     if *request != Request::Status {
         session.command(request)?;
-        // Taken up with the next period; a serial line is no faster than that, QEMU's socket may be.
-        std::thread::sleep(Duration::from_millis(2));
+        std::thread::sleep(TAKEN_UP);
     }
     session.status()
 }

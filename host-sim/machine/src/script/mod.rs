@@ -95,7 +95,7 @@ impl Script {
                 text,
                 line,
                 "the feed is 0 from here on, so the run would never end".to_owned(),
-                "let another override follow, or hold, stop or abort".to_owned(),
+                "let another override follow, or a hold or abort (a stop and a pause obey the override on their way up)".to_owned(),
             )),
             None => Ok(script),
         }
@@ -103,19 +103,21 @@ impl Script {
 
     /// Whether the script leaves a run at an override of 0, neither held nor ended.
     fn stands_for_ever(&self) -> bool {
-        let mut steps = self.steps.iter().rev();
-        let last = steps.find_map(|(period, inputs)| Some((*period, inputs.override_percent?)));
-        let Some((since, 0)) = last else {
+        let steps = self.steps.iter().rev();
+        if steps.clone().find_map(|(_, inputs)| inputs.override_percent) != Some(0) {
             return false;
-        };
-        let mut steps = self.steps.iter().rev();
-        let action = steps.find_map(|(period, inputs)| Some((*period, inputs.action?)));
-        !action.is_some_and(|(period, action)| match action {
-            Command::Hold | Command::Stop | Command::Abort => true,
-            // Its ways obey the override.
-            Command::Pause => period < since,
-            Command::Resume | Command::Start => false,
-        })
+        }
+        let mut actions = steps.filter_map(|(_, inputs)| inputs.action);
+        match actions.find(|action| *action != Command::Hold) {
+            Some(Command::Abort) => false,
+            // Their ways up obey the override, and while the tool slows down for them a hold is ignored.
+            Some(Command::Stop | Command::Pause) => true,
+            _ => self.last_action() != Some(Command::Hold),
+        }
+    }
+
+    fn last_action(&self) -> Option<Command> {
+        self.steps.iter().rev().find_map(|(_, inputs)| inputs.action)
     }
 
     /// The steps: period and inputs; each period once.
@@ -254,13 +256,14 @@ mod tests {
         // A run that stands at the end has to be held or ended.
         for end in [
             "tick 20: hold\n",
-            "tick 20: stop\n",
             "tick 20: abort\n",
+            "tick 20: hold\ntick 21: hold\n",
+            "tick 20: stop\ntick 21: abort\n",
             "tick 20: override 5\n",
         ] {
             Script::parse("s", &format!("tick 9: override 0\n{end}")).unwrap();
         }
-        Script::parse("s", "tick 9: pause\ntick 900: override 0\n").unwrap();
+        Script::parse("s", "tick 9: hold\ntick 10: override 0\n").unwrap();
     }
 
     #[test]
@@ -293,6 +296,26 @@ mod tests {
             (
                 "tick 5: override 0\ntick 9: pause\n",
                 1,
+                "the feed is 0 from here on",
+            ),
+            (
+                "tick 5: override 0\ntick 9: stop\n",
+                1,
+                "the feed is 0 from here on",
+            ),
+            (
+                "tick 5: stop\ntick 9: override 0\n",
+                2,
+                "the feed is 0 from here on",
+            ),
+            (
+                "tick 5: pause\ntick 900: override 0\n",
+                2,
+                "the feed is 0 from here on",
+            ),
+            (
+                "tick 5: stop\ntick 9: override 0\ntick 10: hold\n",
+                2,
                 "the feed is 0 from here on",
             ),
             ("tick -5: hold\n", 1, "`-5` is no number"),

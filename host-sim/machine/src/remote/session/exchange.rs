@@ -4,13 +4,19 @@ use std::io;
 use std::time::{Duration, Instant};
 
 use protocol::frame::{DELIMITER, FRAME_MAX, write_request};
-use protocol::message::{Reply, Request, next_number, read_reply};
+use protocol::message::{JogWay, Reason, Reply, Request, next_number, read_reply};
 
 use super::{Event, RemoteError, Session};
 
-/// Time-out of a reply, after which the request is sent again. A reply takes 0.2 ms in QEMU and a few ms over a serial line; a board that
+/// Longest time-out of a reply, after which the request is sent again. A reply takes 0.2 ms in QEMU and a few ms over a serial line; a board that
 /// checks a job, or a QEMU that shares its processor, may take longer.
 const ANSWER_TIMEOUT: Duration = Duration::from_millis(1500);
+
+/// Periods of a board after which the first request outside a run is repeated: a quarter of those after which the board ends a motion and switches a spindle off.
+const ANSWER_PERIODS: u32 = 250;
+
+/// Time after which a jog is given up that lasts for as long as its key is held: about the repetition of a key.
+const KEY_TIMEOUT: Duration = Duration::from_millis(150);
 
 /// During a run the time-out of a reply is the board's heartbeat timeout divided by this, so that a lost frame is repeated well before the heartbeat timeout.
 const KEEP_ALIVE_SHARE: u32 = 4;
@@ -30,6 +36,25 @@ pub(super) const PROCESS_SILENCE_TIMEOUT: Duration = Duration::from_secs(780);
 impl Session {
     /// Sends a request, repeatedly if necessary, and waits for the reply with its number.
     pub(super) fn ask(&mut self, request: &Request) -> Result<Reply, RemoteError> {
+        let given_up = std::mem::take(&mut self.gave_up).then(|| next_number(self.number));
+        let reply = self.exchange(request)?;
+        match (given_up, &reply) {
+            // The request that was given up had arrived.
+            (
+                Some(number),
+                Reply::Nak {
+                    reason: Reason::OutOfOrder { expected },
+                    ..
+                },
+            ) if *expected == next_number(number) => {
+                self.number = number;
+                self.exchange(request)
+            }
+            _ => Ok(reply),
+        }
+    }
+
+    fn exchange(&mut self, request: &Request) -> Result<Reply, RemoteError> {
         let number = next_number(self.number);
         let mut buffer = [0; FRAME_MAX];
         let frame = write_request(number, request, &mut buffer).map_err(|_| {
@@ -40,15 +65,26 @@ impl Session {
         })?;
         self.asked = Instant::now();
         let is_process = self.stream.is_process();
+        let by_key = matches!(
+            request,
+            Request::Jog {
+                way: JogWay::Towards { .. },
+                ..
+            }
+        );
         let (give_up, silent) = if is_process {
             (PROCESS_SILENCE_TIMEOUT, "a request was repeated for 13 minutes")
+        } else if by_key {
+            (KEY_TIMEOUT, "the jog was lost on the line, and is not repeated")
         } else {
             (GIVE_UP, "a request was repeated for 6 s")
         };
-        let mut timeout = self.answer_timeout();
+        let mut timeout = self.answer_timeout().min(give_up);
         if matches!(request, Request::JobChunk { .. }) {
             timeout = timeout.min(CHUNK_TIMEOUT);
         }
+        // A job is checked, and flash is written, outside a run.
+        let grows = is_process || self.keep_alive.is_none();
         self.tries = 0;
         while self.asked.elapsed() < give_up {
             self.tries += 1;
@@ -56,7 +92,7 @@ impl Session {
             self.stream.write_all(frame)?;
             self.stream.flush()?;
             let deadline = Instant::now() + timeout;
-            if is_process {
+            if grows {
                 timeout *= 2;
             }
             while Instant::now() < deadline {
@@ -77,16 +113,26 @@ impl Session {
                     None => self.read_some()?,
                 }
             }
+            if by_key {
+                // Of a frame that has arrived without its end this makes a damaged one, which does nothing.
+                self.stream.write_all(&[!DELIMITER])?;
+            }
             self.stream.write_all(&[DELIMITER])?;
         }
+        self.gave_up = by_key;
         Err(RemoteError::Silent(silent))
     }
 
     /// How long an answer may take before the request is sent again.
     fn answer_timeout(&self) -> Duration {
-        self.keep_alive.map_or(ANSWER_TIMEOUT, |every| {
-            (every / KEEP_ALIVE_SHARE).clamp(ANSWER_TIMEOUT_MIN, ANSWER_TIMEOUT)
-        })
+        let period_us = self.capabilities.description.period_us;
+        let timeout = match self.keep_alive {
+            Some(every) => every / KEEP_ALIVE_SHARE,
+            // Before its hello, and of a process, which has no axes.
+            None if period_us == 0 || self.stream.is_process() => ANSWER_TIMEOUT,
+            None => Duration::from_micros(period_us.into()) * ANSWER_PERIODS,
+        };
+        timeout.clamp(ANSWER_TIMEOUT_MIN, ANSWER_TIMEOUT)
     }
 
     /// Reads the available bytes, or waits a moment.

@@ -65,6 +65,8 @@ pub struct Session {
     tries: u32,
     /// A damaged frame came since the last one.
     is_damaged: bool,
+    /// The last request was given up: it may have arrived, or not.
+    gave_up: bool,
     /// Where the runs of the loaded job begin.
     start: RunStart,
     /// Why the board had paused by itself in the last status.
@@ -94,6 +96,7 @@ impl Session {
             feed: None,
             tries: 0,
             is_damaged: false,
+            gave_up: false,
             start: RunStart::FIRST,
             paused: PauseCause::None,
         };
@@ -161,3 +164,6 @@ impl Session {
         self.start
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use protocol::message::{Clock, PauseCause, Reason, Reply, Request, Status};
+use protocol::message::{Activity, Clock, PauseCause, Reason, Reply, Request, Status};
 
 use interp_core::State;
 
@@ -12,7 +12,7 @@ use super::exchange::PROCESS_SILENCE_TIMEOUT;
 use super::{Event, LineLosses, RemoteError, Session};
 
 /// Time-out of the events of a run.
-const SILENCE_TIMEOUT: Duration = Duration::from_secs(20);
+pub(super) const SILENCE_TIMEOUT: Duration = Duration::from_secs(20);
 
 /// Silence in a run after which the status is requested: it tells an end whose event was lost. A process loses nothing, but may be slow.
 const LOOK: Duration = Duration::from_secs(1);
@@ -154,8 +154,14 @@ impl Session {
             }
             return Ok(());
         }
-        // In lockstep the host itself lets time pass, held or not.
-        if state == State::Held && status.clock == Clock::Free && !self.patient {
+        let stands = state == State::Held || !state.is_under_way();
+        if stands && self.spins_up()? {
+            self.heard = Instant::now();
+            return Ok(());
+        }
+        // In lockstep the host itself lets time pass, held or not. The second status: what waited may have begun since the first.
+        let is_left = state == State::Held && status.clock == Clock::Free && !self.patient;
+        if is_left && self.status()?.state == State::Held {
             return Err(match status.safety.pause {
                 PauseCause::None => RemoteError::Held,
                 cause => RemoteError::Paused(operate::cause(cause)),
@@ -165,5 +171,13 @@ impl Session {
             self.heard = Instant::now();
         }
         Ok(())
+    }
+
+    /// Whether a start or resume waits for the spindle; the state does not tell it.
+    ///
+    /// # Errors
+    /// As [`Self::command`].
+    pub fn spins_up(&mut self) -> Result<bool, RemoteError> {
+        Ok(self.motion()?.activity == Activity::SpinUp)
     }
 }
