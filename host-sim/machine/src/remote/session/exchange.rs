@@ -80,11 +80,12 @@ impl Session {
             (GIVE_UP, "a request was repeated for 6 s")
         };
         let mut timeout = self.answer_timeout().min(give_up);
-        if matches!(request, Request::JobChunk { .. }) {
+        let is_chunk = matches!(request, Request::JobChunk { .. });
+        if is_chunk {
             timeout = timeout.min(CHUNK_TIMEOUT);
         }
         // A job is checked, and flash is written, outside a run.
-        let grows = is_process || self.keep_alive.is_none();
+        let grows = is_process || (self.keep_alive.is_none() && !is_chunk);
         self.tries = 0;
         while self.asked.elapsed() < give_up {
             self.tries += 1;
