@@ -348,6 +348,44 @@ fn distances_are_those_of_the_surfaces() {
     );
 }
 
+/// Beside the apex of a cone, which is at the lower end of v, all distances are those of the flank.
+#[test]
+fn distances_beside_an_apex_are_those_of_the_flank() {
+    let (apex, base, height) = (dvec3(25.0, 25.0, 8.0), 0.8, 8.0);
+    let cone = Surface::Cone {
+        origin: apex,
+        x: DVec3::X,
+        y: -DVec3::Y,
+        z: -DVec3::Z,
+        radius: 0.0,
+        slope: base / height,
+    };
+    let rim: Edge = circle(base, 0.0, -1.0)
+        .concat()
+        .iter()
+        .map(|at| *at + dvec3(25.0, 25.0, 0.0))
+        .collect();
+    let tip = dvec3(25.0, 25.0, 8.0);
+    for sense in [1.0, -1.0] {
+        let part = Part::new(&[face(1, cone.clone(), vec![vec![rim.clone()]], sense)]);
+        assert_eq!(part.missing, []);
+        let mut far = Vec::new();
+        for turn in 1..24 {
+            let angle = TAU * f64::from(turn) / 24.0;
+            let out = dvec3(angle.cos(), angle.sin(), 0.0);
+            let along = (base * out - height * DVec3::Z).normalize();
+            let away = (height * out + base * DVec3::Z).normalize();
+            for foot in [0.02, 0.05, 0.1, 0.2, 0.3, 0.5] {
+                let point = tip + foot * along + 0.45 * away;
+                let found = part.nearest(point, 3.0, None, false).expect("near the cone");
+                far.push((found.distance - 0.45).abs());
+            }
+        }
+        let worst = far.iter().copied().fold(0.0, f64::max);
+        assert!(worst < 1e-3, "{worst} mm");
+    }
+}
+
 /// Passes one step-over apart on a plane leave the scallop height between them.
 #[test]
 fn what_is_left_between_passes_is_the_scallop() {
