@@ -109,25 +109,45 @@ impl Cut {
         }
     }
 
-    /// The position at a share of the way from its start, mm.
-    #[must_use]
-    pub fn at(&self, from_mm: DVec3, share: f64) -> DVec3 {
-        let mut at_mm = from_mm.lerp(self.to_mm, share);
+    /// Of an arc from this start: its plane, its centre, the arm from there to the start, and the angle by which it turns, positive counterclockwise.
+    fn turn(&self, from_mm: DVec3) -> Option<(Plane, DVec3, [f64; 2], f64)> {
         let Shape::Arc {
             plane,
             centre_mm,
             clockwise,
         } = self.shape
         else {
-            return at_mm;
+            return None;
         };
         let [first, second, _] = plane.axes();
         let arm = |at: DVec3| [at[first] - centre_mm[first], at[second] - centre_mm[second]];
         let (from, to) = (arm(from_mm), arm(self.to_mm));
         let sense = if clockwise { -1.0 } else { 1.0 };
         let outer = sense * (from[0] * to[1] - from[1] * to[0]);
-        let angle = sense * share * outer.atan2(from[0] * to[0] + from[1] * to[1]);
-        let (sine, cosine) = angle.sin_cos();
+        let angle = sense * outer.atan2(from[0] * to[0] + from[1] * to[1]);
+        Some((plane, centre_mm, from, angle))
+    }
+
+    /// Number of equal parts whose chords are within this distance of the cut.
+    #[must_use]
+    pub fn parts(&self, from_mm: DVec3, chord_mm: f64) -> u32 {
+        let Some((_, _, [x, y], angle)) = self.turn(from_mm) else {
+            return 1;
+        };
+        // The sagitta is r (1 - cos(angle / 2)), at most r angle^2 / 8.
+        let parts = angle.abs() * (x.hypot(y) / (8.0 * chord_mm)).sqrt();
+        parts.ceil().max(1.0) as u32
+    }
+
+    /// The position at a share of the way from its start, mm.
+    #[must_use]
+    pub fn at(&self, from_mm: DVec3, share: f64) -> DVec3 {
+        let mut at_mm = from_mm.lerp(self.to_mm, share);
+        let Some((plane, centre_mm, from, angle)) = self.turn(from_mm) else {
+            return at_mm;
+        };
+        let [first, second, _] = plane.axes();
+        let (sine, cosine) = (share * angle).sin_cos();
         at_mm[first] = centre_mm[first] + from[0] * cosine - from[1] * sine;
         at_mm[second] = centre_mm[second] + from[0] * sine + from[1] * cosine;
         at_mm
