@@ -9,6 +9,8 @@ use glam::DVec3;
 pub const RESOLUTION_MM: f64 = 1e-4;
 /// Significant digits of a feed: relative error below 5e-5.
 const FEED_DIGITS: i32 = 5;
+/// Least angle of an arc, rad. Controllers take less for a full turn: LinuxCNC below 1e-6, Grbl below 5e-7 in single precision. The sagitta of such an arc of 10 m is 0.1 nm.
+const ANGLE_MIN: f64 = 1e-5;
 const AXES: [&str; 3] = ["X", "Y", "Z"];
 const OFFSETS: [&str; 3] = ["I", "J", "K"];
 
@@ -107,25 +109,45 @@ impl Cut {
         }
     }
 
-    /// The position at a share of the way from its start, mm.
-    #[must_use]
-    pub fn at(&self, from_mm: DVec3, share: f64) -> DVec3 {
-        let mut at_mm = from_mm.lerp(self.to_mm, share);
+    /// Of an arc from this start: its plane, its centre, the arm from there to the start, and the angle by which it turns, positive counterclockwise.
+    fn turn(&self, from_mm: DVec3) -> Option<(Plane, DVec3, [f64; 2], f64)> {
         let Shape::Arc {
             plane,
             centre_mm,
             clockwise,
         } = self.shape
         else {
-            return at_mm;
+            return None;
         };
         let [first, second, _] = plane.axes();
         let arm = |at: DVec3| [at[first] - centre_mm[first], at[second] - centre_mm[second]];
         let (from, to) = (arm(from_mm), arm(self.to_mm));
         let sense = if clockwise { -1.0 } else { 1.0 };
         let outer = sense * (from[0] * to[1] - from[1] * to[0]);
-        let angle = sense * share * outer.atan2(from[0] * to[0] + from[1] * to[1]);
-        let (sine, cosine) = angle.sin_cos();
+        let angle = sense * outer.atan2(from[0] * to[0] + from[1] * to[1]);
+        Some((plane, centre_mm, from, angle))
+    }
+
+    /// Number of equal parts whose chords are within this distance of the cut.
+    #[must_use]
+    pub fn parts(&self, from_mm: DVec3, chord_mm: f64) -> u32 {
+        let Some((_, _, [x, y], angle)) = self.turn(from_mm) else {
+            return 1;
+        };
+        // The sagitta is r (1 - cos(angle / 2)), at most r angle^2 / 8.
+        let parts = angle.abs() * (x.hypot(y) / (8.0 * chord_mm)).sqrt();
+        parts.ceil().max(1.0) as u32
+    }
+
+    /// The position at a share of the way from its start, mm.
+    #[must_use]
+    pub fn at(&self, from_mm: DVec3, share: f64) -> DVec3 {
+        let mut at_mm = from_mm.lerp(self.to_mm, share);
+        let Some((plane, centre_mm, from, angle)) = self.turn(from_mm) else {
+            return at_mm;
+        };
+        let [first, second, _] = plane.axes();
+        let (sine, cosine) = (share * angle).sin_cos();
         at_mm[first] = centre_mm[first] + from[0] * cosine - from[1] * sine;
         at_mm[second] = centre_mm[second] + from[0] * sine + from[1] * cosine;
         at_mm
@@ -226,6 +248,11 @@ impl<'a> Blocks<'a> {
             return;
         }
         let (motion, offsets) = match cut.shape {
+            Shape::Arc {
+                plane,
+                centre_mm,
+                clockwise,
+            } if !self.turns(plane, centre_mm, clockwise, to) => ("G1", String::new()),
             Shape::Line => ("G1", String::new()),
             Shape::Arc {
                 plane,
@@ -250,6 +277,21 @@ impl<'a> Blocks<'a> {
             FeedMode::G93 => S_PER_MIN / cut.time_s(),
         };
         self.block(motion, to, &offsets, Some(feed_digits(feed)));
+    }
+
+    /// Whether an arc between the rounded ends around the rounded centre turns by enough to be written as one: its ends may be rounded to one place in its plane, or to
+    /// places in one direction from the centre.
+    fn turns(&self, plane: Plane, centre_mm: DVec3, clockwise: bool, to: [Option<i64>; 3]) -> bool {
+        let [first, second, _] = plane.axes();
+        let arm = |at: &[Option<i64>; 3]| {
+            [first, second].map(|axis| (at[axis].unwrap_or_default() - steps(centre_mm[axis])) as f64)
+        };
+        let (from, to) = (arm(&self.at), arm(&to));
+        let sense = if clockwise { -1.0 } else { 1.0 };
+        let outer = sense * (from[0] * to[1] - from[1] * to[0]);
+        let angle = outer.atan2(from[0] * to[0] + from[1] * to[1]);
+        // At a small radius, rounding alone turns by half of a step.
+        angle > ANGLE_MIN.max(0.5 / from[0].hypot(from[1]).max(1.0))
     }
 
     fn block(&mut self, motion: &'static str, to: [Option<i64>; 3], offsets: &str, feed: Option<String>) {
@@ -325,6 +367,46 @@ mod tests {
         assert!(arc.at(from_mm, 0.5).distance(DVec3::new(half, -half, 1.0)) < 1e-12);
     }
 
+    /// Equal ends in the plane of an arc are a full turn in G-code.
+    #[test]
+    fn an_arc_without_a_turn_in_its_plane_is_a_line() {
+        let arc = |to_mm| Cut {
+            to_mm,
+            length_mm: 0.003,
+            speed_mm_s: 10.0,
+            shape: Shape::Arc {
+                plane: Plane::Xy,
+                centre_mm: DVec3::new(0.0, 1.0, 0.0),
+                clockwise: false,
+            },
+        };
+        let steep = [arc(DVec3::new(3e-5, 1e-5, 0.003))];
+        assert_eq!(text(FeedMode::G94, &steep), "G1Z0.003F600\n");
+        // A step towards the centre does not turn, either.
+        let inwards = [arc(DVec3::new(4e-5, 6e-5, 0.003))];
+        assert_eq!(text(FeedMode::G94, &inwards), "G1Y0.0001Z0.003F600\n");
+        let step = [arc(DVec3::new(6e-5, 0.0, 0.003))];
+        assert_eq!(text(FeedMode::G94, &step), "G3X0.0001Z0.003I0J1F600\n");
+    }
+
+    /// LinuxCNC takes an arc of less than 1e-6 rad for a full turn, Grbl one of 5e-7 rad.
+    #[test]
+    fn an_arc_of_a_small_angle_is_a_line() {
+        for (radius_mm, letter) in [(10_000.0, "G1"), (90.0, "G3")] {
+            let arc = Cut {
+                to_mm: DVec3::new(0.002, 0.0, 0.0),
+                length_mm: 0.002,
+                speed_mm_s: 10.0,
+                shape: Shape::Arc {
+                    plane: Plane::Xy,
+                    centre_mm: DVec3::new(0.0, radius_mm, 0.0),
+                    clockwise: false,
+                },
+            };
+            assert!(text(FeedMode::G94, &[arc]).starts_with(letter), "{radius_mm}");
+        }
+    }
+
     #[test]
     fn arcs_name_their_plane_once() {
         let arc = |to_mm| Cut {
@@ -334,10 +416,10 @@ mod tests {
             shape: Shape::Arc {
                 plane: Plane::Zx,
                 centre_mm: DVec3::new(5.0, 0.0, 0.0),
-                clockwise: true,
+                clockwise: false,
             },
         };
         let cuts = [arc(DVec3::new(5.0, 0.0, 5.0)), arc(DVec3::new(10.0, 0.0, 0.0))];
-        assert_eq!(text(FeedMode::G94, &cuts), "G18G2X5Z5I5K0F60\nX10Z0I0K-5\n");
+        assert_eq!(text(FeedMode::G94, &cuts), "G18G3X5Z5I5K0F60\nX10Z0I0K-5\n");
     }
 }

@@ -18,6 +18,8 @@ mod links;
 mod order;
 mod planner;
 mod setup;
+#[cfg(test)]
+mod sources;
 mod stops;
 mod sums;
 mod text;

@@ -220,6 +220,8 @@ impl Cell {
         let Some((distance, at)) = [below, above]
             .into_iter()
             .flatten()
+            // What is not a number may be below every number.
+            .filter(|(distance, _)| distance.is_finite())
             .min_by(|a, b| a.0.total_cmp(&b.0))
         else {
             return;

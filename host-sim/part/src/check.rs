@@ -30,15 +30,36 @@ impl PassCentres {
         self.samples.push((sample.tick, sample.pass));
     }
 
+    /// Places on the passes, close enough that checking each one checks the passes, and the tick of each: that of the sample before it.
+    fn places(&self, radius_mm: f64) -> (Vec<DVec3>, Vec<u64>) {
+        let (mut places, mut ticks) = (Vec::new(), Vec::new());
+        for (index, (centre, (tick, _))) in self.centres.iter().zip(&self.samples).enumerate() {
+            match self.piece(index, radius_mm) {
+                // The end is the next sample.
+                Some(ends) => {
+                    let between = along(&ends, radius_mm);
+                    places.extend_from_slice(&between[..between.len() - 1]);
+                }
+                None => places.push(*centre),
+            }
+            ticks.resize(places.len(), *tick);
+        }
+        (places, ticks)
+    }
+
     /// The pieces of the passes.
     fn pieces(&self, radius_mm: f64) -> Vec<[DVec3; 2]> {
-        let pairs = self.centres.windows(2).zip(self.samples.windows(2));
-        let joined = pairs.filter(|(ends, samples)| {
-            samples[0].1 == samples[1].1
-                && samples[1].0 == samples[0].0 + 1
-                && ends[0].distance(ends[1]) < JUMP_RADII * radius_mm
-        });
-        joined.map(|(ends, _)| [ends[0], ends[1]]).collect()
+        let starts = 0..self.centres.len();
+        starts.filter_map(|start| self.piece(start, radius_mm)).collect()
+    }
+
+    /// The piece from a sample to the next one, if both are of one pass.
+    fn piece(&self, start: usize, radius_mm: f64) -> Option<[DVec3; 2]> {
+        let ends = [*self.centres.get(start)?, *self.centres.get(start + 1)?];
+        let ((tick, pass), (next_tick, next_pass)) = (self.samples[start], self.samples[start + 1]);
+        let is_joined =
+            pass == next_pass && next_tick == tick + 1 && ends[0].distance(ends[1]) < JUMP_RADII * radius_mm;
+        is_joined.then_some(ends)
     }
 }
 
@@ -47,7 +68,7 @@ impl PassCentres {
 pub struct PartCheck {
     /// The deepest place of the tool in the part on the passes and between them; `None`: the job names no part.
     pub deepest: Option<[Option<Deepest>; 2]>,
-    /// Numbers of centres that were looked at: on passes, between them.
+    /// Numbers of places of the ball's centre that were looked at: on passes, between them.
     pub counts: [usize; 2],
     /// Greatest depth that is allowed, mm.
     pub tolerance_mm: f64,
@@ -81,19 +102,19 @@ pub fn check_run(
         .iter()
         .flat_map(|way| along(way, job.radius_mm))
         .collect();
+    let (on_passes, ticks) = centres.places(job.radius_mm);
     let deepest = asked
         .part()
-        .map(|part| [&centres.centres, &between].map(|centres| deepest(part, asked.tool(), centres)));
+        .map(|part| [&on_passes, &between].map(|centres| deepest(part, asked.tool(), centres)));
     let places = request.places(&Inside::new(request.trimmed), LEFTOVER_SIDE);
     let passes = Passes::new(centres.pieces(job.radius_mm));
     let leftover = leftover(&request.clearance(), &places, &passes, job.scallop_mm);
     let tick = deepest
-        .and_then(|[on_passes, _]| on_passes)
-        .and_then(|found| centres.samples.get(found.index))
-        .map(|(tick, _)| *tick);
+        .and_then(|[found, _]| found)
+        .and_then(|found| ticks.get(found.index).copied());
     let mut check = PartCheck {
         deepest,
-        counts: [centres.centres.len(), between.len()],
+        counts: [on_passes.len(), between.len()],
         tolerance_mm: request.touch_mm,
         unknown: reach.unknown.len() + asked.part().map_or(0, |part| part.left_out),
         leftover,
@@ -153,5 +174,32 @@ impl PartCheck {
         } else {
             0.0
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Samples of a pass that are 0.4 mm apart have places between them, less apart for a small ball; samples of two passes have none.
+    #[test]
+    fn passes_are_looked_at_between_their_samples() {
+        let mut centres = PassCentres::default();
+        for (tick, pass, x_nm) in [(5, 0, 0), (6, 0, 400_000), (7, 1, 800_000), (8, 1, 850_000)] {
+            centres
+                .centres
+                .push(DVec3::new(f64::from(x_nm) * MM_PER_NM, 0.0, 0.0));
+            centres.samples.push((tick, pass));
+        }
+        let (places, ticks) = centres.places(3.0);
+        let wanted = [0.0, 0.1, 0.2, 0.3, 0.4, 0.8, 0.85].map(|x| DVec3::new(x, 0.0, 0.0));
+        assert_eq!(places.len(), wanted.len(), "{places:?}");
+        assert!(
+            places.iter().zip(wanted).all(|(a, b)| a.distance(b) < 1e-12),
+            "{places:?}"
+        );
+        assert_eq!(ticks, [5, 5, 5, 5, 6, 7, 8]);
+        // sqrt(8 r d) is 0.045 mm: 9 steps of 0.4 mm, 2 of 0.05.
+        assert_eq!(centres.places(0.5).0.len(), 4 + 8 + 1);
     }
 }

@@ -13,6 +13,8 @@ const HALVINGS: u32 = 7;
 const MOVE_BISECTIONS: usize = 10;
 /// Largest factor by which a place is moved farther in (u, v) than its derivatives give.
 const FARTHER_MAX: f64 = 64.0;
+/// Least number of lines of the grid between two sides.
+const LINES_MIN: usize = 8;
 /// Largest number of places of the grid.
 const PLACES_MAX: usize = 4_000_000;
 
@@ -31,6 +33,15 @@ pub struct Precision {
     pub simplify_mm: f64,
 }
 
+/// A stretch of a parameter between two knots.
+#[derive(Clone, Copy, Debug)]
+pub struct Span {
+    /// Its ends.
+    pub range: [f64; 2],
+    /// Length along which the grid has lines, mm: that of the surface or of the ball's centre, at most.
+    pub length_mm: f64,
+}
+
 /// A set of places within a rectangle of (u, v).
 pub struct Set<'a> {
     /// The rectangle.
@@ -41,8 +52,8 @@ pub struct Set<'a> {
     pub metric: [f64; 2],
     /// Where the places are in space.
     pub surface: &'a Surface,
-    /// How much closer together the places of the grid are along u and v.
-    pub finer: [f64; 2],
+    /// The rectangle's spans in u and v: the lines of the grid are evenly spaced within each.
+    pub spans: [Vec<Span>; 2],
     /// Whether a place is in it.
     pub holds: &'a (dyn Fn(Place) -> bool + Sync),
     /// Whether a place is deep enough inside: a grid cell with four such corners lies inside as a whole.
@@ -52,6 +63,8 @@ pub struct Set<'a> {
 /// The grid with its answers; one line of places beyond each side is outside.
 struct Grid {
     counts: [usize; 2],
+    /// Parameters of its lines.
+    lines: [Vec<f64>; 2],
     holds: Vec<bool>,
     surely: Vec<bool>,
 }
@@ -64,53 +77,65 @@ impl Grid {
     fn at(&self, i: usize, j: usize) -> bool {
         self.holds[self.index(i, j)]
     }
-}
 
-impl Set<'_> {
     /// Place of a grid point, whose lines beyond the sides are at the sides.
-    fn place(&self, counts: [usize; 2], i: usize, j: usize) -> Place {
-        let at = |k: usize, index: usize| {
-            let [low, high] = self.rectangle[k];
-            let index = index.clamp(1, counts[k] + 1) - 1;
-            if index == counts[k] {
-                high
-            } else {
-                low + (high - low) * index as f64 / counts[k] as f64
-            }
-        };
+    fn place(&self, i: usize, j: usize) -> Place {
+        let at = |k: usize, index: usize| self.lines[k][index.clamp(1, self.counts[k] + 1) - 1];
         [at(0, i), at(1, j)]
     }
+}
 
-    fn grid(&self, spacing: f64) -> Grid {
-        let size = |k: usize| (self.rectangle[k][1] - self.rectangle[k][0]) * self.metric[k] * self.finer[k];
-        let wanted = (size(0) / spacing).ceil() * (size(1) / spacing).ceil();
-        let spacing = spacing * (wanted / PLACES_MAX as f64).max(1.0).sqrt();
+/// Lines at most a spacing apart.
+fn lines(spans: &[Span], spacing: f64) -> Vec<f64> {
+    let least = LINES_MIN.div_ceil(spans.len().max(1));
+    let mut lines: Vec<f64> = spans.first().map(|span| span.range[0]).into_iter().collect();
+    for Span {
+        range: [low, high],
+        length_mm,
+    } in spans
+    {
         #[allow(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
             reason = "at most a few million"
         )]
-        let counts = [0, 1].map(|k| ((size(k) / spacing).ceil() as usize).clamp(8, PLACES_MAX));
+        let count = ((length_mm / spacing).ceil() as usize).clamp(least, PLACES_MAX);
+        lines.extend((1..count).map(|index| low + (high - low) * index as f64 / count as f64));
+        lines.push(*high);
+    }
+    lines
+}
+
+impl Set<'_> {
+    fn grid(&self, spacing: f64) -> Grid {
+        let count = |k: usize| -> f64 {
+            let spans = self.spans[k].iter();
+            spans.map(|span| (span.length_mm / spacing).ceil()).sum()
+        };
+        let spacing = spacing * (count(0) * count(1) / PLACES_MAX as f64).max(1.0).sqrt();
+        let lines = [0, 1].map(|k| lines(&self.spans[k], spacing));
+        let counts = [0, 1].map(|k| lines[k].len() - 1);
         let mut grid = Grid {
             counts,
+            lines,
             holds: vec![false; (counts[0] + 3) * (counts[1] + 3)],
             surely: vec![false; (counts[0] + 3) * (counts[1] + 3)],
         };
         let width = counts[0] + 3;
-        let rows = grid
-            .holds
-            .par_chunks_mut(width)
-            .zip(grid.surely.par_chunks_mut(width));
+        let mut holds = std::mem::take(&mut grid.holds);
+        let mut surely = std::mem::take(&mut grid.surely);
+        let rows = holds.par_chunks_mut(width).zip(surely.par_chunks_mut(width));
         rows.enumerate().for_each(|(j, (holds, surely))| {
             if j == 0 || j == counts[1] + 2 {
                 return;
             }
             for i in 1..counts[0] + 2 {
-                let place = self.place(counts, i, j);
+                let place = grid.place(i, j);
                 holds[i] = (self.holds)(place);
                 surely[i] = holds[i] && (self.is_sure)(place);
             }
         });
+        (grid.holds, grid.surely) = (holds, surely);
         grid
     }
 
@@ -125,10 +150,7 @@ impl Set<'_> {
                 {
                     return false;
                 }
-                let ([u0, v0], [u1, v1]) = (
-                    self.place(grid.counts, i, j),
-                    self.place(grid.counts, i + 1, j + 1),
-                );
+                let ([u0, v0], [u1, v1]) = (grid.place(i, j), grid.place(i + 1, j + 1));
                 let [u, v] = [0.5 * (u0 + u1), 0.5 * (v0 + v1)];
                 let middles = [[u, v], [u, v0], [u, v1], [u0, v], [u1, v]];
                 middles.into_iter().any(|place| !(self.holds)(place))
@@ -156,13 +178,21 @@ impl Set<'_> {
         ((b[0] - a[0]) * self.metric[0]).hypot((b[1] - a[1]) * self.metric[1])
     }
 
+    /// The metric at a place: a short span has another one than a long one.
+    fn metric_at(&self, [u, v]: Place) -> [f64; 2] {
+        let at = self.surface.at(u, v);
+        let lengths = [at.u.length(), at.v.length()];
+        std::array::from_fn(|k| lengths[k].clamp(self.metric[k] / FARTHER_MAX, self.metric[k]))
+    }
+
     /// A place moved to the left of the direction from a to b, mm.
     fn beside(&self, from: Place, a: Place, b: Place, by: f64) -> Place {
-        let (du, dv) = ((b[0] - a[0]) * self.metric[0], (b[1] - a[1]) * self.metric[1]);
+        let metric = self.metric_at(from);
+        let (du, dv) = ((b[0] - a[0]) * metric[0], (b[1] - a[1]) * metric[1]);
         let length = du.hypot(dv).max(f64::MIN_POSITIVE);
         let moved = [
-            from[0] - by * dv / length / self.metric[0],
-            from[1] + by * du / length / self.metric[1],
+            from[0] - by * dv / length / metric[0],
+            from[1] + by * du / length / metric[1],
         ];
         std::array::from_fn(|k| moved[k].clamp(self.rectangle[k][0], self.rectangle[k][1]))
     }
@@ -244,10 +274,7 @@ impl Set<'_> {
                 let enters: Vec<usize> = (0..4).filter(|k| !corners[*k] && corners[(k + 1) % 4]).collect();
                 let leaves: Vec<usize> = (0..4).filter(|k| corners[*k] && !corners[(k + 1) % 4]).collect();
                 let is_joined = enters.len() == 2 && {
-                    let (a, b) = (
-                        self.place(grid.counts, i, j),
-                        self.place(grid.counts, i + 1, j + 1),
-                    );
+                    let (a, b) = (grid.place(i, j), grid.place(i + 1, j + 1));
                     (self.holds)([0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])])
                 };
                 for leave in &leaves {
@@ -271,7 +298,7 @@ impl Set<'_> {
             let (index, along_v) = (edge / 2, edge % 2);
             let (i, j) = (index % width, index / width);
             let ends = [(i, j), (i + 1 - along_v, j + along_v)];
-            let [a, b] = ends.map(|(i, j)| self.place(grid.counts, i, j));
+            let [a, b] = ends.map(|(i, j)| grid.place(i, j));
             if grid.at(ends[0].0, ends[0].1) {
                 self.bisected(a, b)
             } else {
@@ -295,11 +322,13 @@ impl Set<'_> {
 
     /// Adds the vertices between two of a loop, at which its chord follows the boundary.
     fn chord(&self, a: Place, b: Place, step: f64, chord_mm: f64, left: u32, out: &mut Vec<Place>) {
-        let length = self.length(a, b);
+        let middle = [0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])];
+        let metric = self.metric_at(middle);
+        let between = |a: Place, b: Place| ((b[0] - a[0]) * metric[0]).hypot((b[1] - a[1]) * metric[1]);
+        let length = between(a, b);
         if left == 0 || length < 2.0 * chord_mm {
             return;
         }
-        let middle = [0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])];
         let reach = (0.75 * length).min(step);
         let is_in = (self.holds)(middle);
         let side = if is_in { -1.0 } else { 1.0 };
@@ -316,7 +345,7 @@ impl Set<'_> {
         } else {
             self.bisected(far, middle)
         };
-        if self.length(found, middle) <= chord_mm && is_in {
+        if between(found, middle) <= chord_mm && is_in {
             return;
         }
         self.chord(a, found, step, chord_mm, left - 1, out);

@@ -1,7 +1,7 @@
 //! Links between the intervals of a region: only as high as the tool needs over the part, or over the surface itself where no part is known.
 //!
 //! A link over the part rises at the end of a pass, crosses at one height, and comes down at the start of the next. Where the tool stands on both it is clear, and no part of it is taken
-//! to be thinner than the ball, so it is clear above both. So the crossing decides: the least height at which the whole tool is clear along it is bisected.
+//! to be thinner than the ball or a part below it, so it is clear above both, but for overhangs beside a thin part on the way up. So the crossing decides: the least height at which the whole tool is clear along it is bisected.
 //!
 //! Past a wall that bulges towards the tool neither the straight way is clear nor any that is not above the wall. There a link goes around: straight to a place beside the middle of both
 //! ends and somewhat above, and straight from there, at the feed. Of all ways that are clear the one that takes least time is taken.
@@ -20,7 +20,7 @@ use crate::tool::Tool;
 use job_file::FaceError;
 
 /// Number of the method by which links are made: cached links of another method are not used.
-const METHOD: u32 = 3;
+const METHOD: u32 = 4;
 /// Least height of a crossing above both ends of a link, mm.
 const LIFT_MM: f64 = 0.3;
 /// Precision of the height of a crossing, mm.

@@ -7,7 +7,7 @@ use oracle::Surface;
 
 use crate::body::Part;
 use crate::clear::Clearance;
-use crate::contour::{Precision, Set};
+use crate::contour::{Precision, Set, Span};
 use crate::crease::strips;
 use crate::inside::Inside;
 use crate::tool::{Reason, Tool};
@@ -18,8 +18,12 @@ use crate::triangle::edge_nearest;
 pub const GROWTH: f64 = 0.51;
 /// Greatest ratio of the step-over on a concave place to that on a plane.
 pub const STEP_MAX: f64 = 2.0;
-/// Places along each parameter of a face at which its step-over and metric are sampled.
+/// Least number of places along each parameter of a face at which its step-over and metric are sampled.
 const LOOKS: usize = 24;
+/// Least number of such places in each span between two knots.
+const SPAN_LOOKS: usize = 4;
+/// Distance of a span's last place from its knot, where the next span begins, as a share of its length.
+const BELOW: f64 = 1e-6;
 /// Precision of the face's own boundary, mm.
 const EDGE_MM: f64 = 0.002;
 /// How far loops are pulled in, mm: gouges of emitted centres lay within 3.3 um of the loop.
@@ -91,8 +95,8 @@ pub struct Made {
 struct Looks {
     /// Largest derivatives by u and v, mm.
     metric: [f64; 2],
-    /// How much farther the ball's centre moves along u and v than the contact, at most; at least 1.
-    stretch: [f64; 2],
+    /// Spans between knots, each with the greatest length along it of the surface or of the ball's centre: that of a centre that moves at most four times as far.
+    spans: [Vec<Span>; 2],
     /// The largest step-over, mm.
     step: f64,
 }
@@ -160,16 +164,24 @@ impl Request<'_> {
     fn looks(&self, rectangle: [[f64; 2]; 2]) -> Looks {
         let r = self.tool.radius;
         let plane = job::plane_step_over_mm(r, self.scallop_mm);
-        let (mut metric, mut of_centre, mut step) = ([1e-9_f64; 2], [0.0_f64; 2], plane);
+        let (mut metric, mut step) = ([1e-9_f64; 2], plane);
         let clearance = self.clearance();
-        for i in 0..=LOOKS {
-            for j in 0..=LOOKS {
-                let share = |k: usize, n: usize| {
-                    rectangle[k][0] + (rectangle[k][1] - rectangle[k][0]) * n as f64 / LOOKS as f64
-                };
-                let (u, v) = (share(0, i), share(1, j));
+        let ranges: [Vec<[f64; 2]>; 2] = [0, 1].map(|k| spans(&clearance.breaks[k], rectangle[k]));
+        let places = ranges.each_ref().map(|ranges| looks_in(ranges));
+        // Of each span: derivative of the contact, and of the ball's centre, mm.
+        let mut longest = ranges
+            .each_ref()
+            .map(|ranges| vec![[1e-9_f64, 0.0]; ranges.len()]);
+        for (in_u, u) in &places[0] {
+            for (in_v, v) in &places[1] {
+                let (spans, u, v) = ([*in_u, *in_v], *u, *v);
                 let at = self.surface.at(u, v);
-                metric = [metric[0].max(at.u.length()), metric[1].max(at.v.length())];
+                let lengths = [at.u.length(), at.v.length()];
+                for k in 0..2 {
+                    metric[k] = metric[k].max(lengths[k]);
+                    let of_contact = &mut longest[k][spans[k]][0];
+                    *of_contact = of_contact.max(lengths[k]);
+                }
                 let place = clearance.place([u, v]);
                 if place.fault.is_none() {
                     let [_, most] = at.principal_curvatures(place.normal);
@@ -179,7 +191,7 @@ impl Request<'_> {
                         let place = clearance.place(uv);
                         place.point + place.normal * r
                     };
-                    for (k, of_centre) in of_centre.iter_mut().enumerate() {
+                    for k in 0..2 {
                         let by = 1e-6 * (rectangle[k][1] - rectangle[k][0]);
                         let [before, after] = [-by, by].map(|by| {
                             let mut uv = [u, v];
@@ -187,14 +199,19 @@ impl Request<'_> {
                             centre(uv)
                         });
                         // At an end the difference is over half of it; `max` leaves out what is not a number.
+                        let of_centre = &mut longest[k][spans[k]][1];
                         *of_centre = of_centre.max(0.5 * before.distance(after) / by);
                     }
                 }
             }
         }
+        let span = |(range, [of_contact, of_centre]): (&[f64; 2], &[f64; 2])| Span {
+            range: *range,
+            length_mm: (range[1] - range[0]) * of_centre.clamp(*of_contact, STRETCH_MAX * of_contact),
+        };
         Looks {
             metric,
-            stretch: [0, 1].map(|k| (of_centre[k] / metric[k]).clamp(1.0, STRETCH_MAX)),
+            spans: [0, 1].map(|k| ranges[k].iter().zip(&longest[k]).map(span).collect()),
             step,
         }
     }
@@ -213,11 +230,7 @@ impl Request<'_> {
     pub fn make(&self) -> Made {
         let trimmed = Inside::new(self.trimmed);
         let domain = self.surface.domain();
-        let Looks {
-            metric,
-            stretch,
-            step,
-        } = self.looks(domain);
+        let Looks { metric, step, .. } = self.looks(domain);
         // What is beside the face is not known without the part.
         let grow_mm = if self.part.is_some() { GROWTH * step } else { 0.0 };
         let rectangle = self.rectangle(domain, metric, grow_mm);
@@ -245,21 +258,15 @@ impl Request<'_> {
         };
         let [of_u, of_v] =
             [Along::U, Along::V].map(|along| strips(self.surface, along, rectangle, self.tool.radius));
-        let is_cut = of_u.len() * of_v.len() > 1;
         for ((u, u_cuts), (v, v_cuts)) in of_u.iter().flat_map(|u| of_v.iter().map(move |v| (*u, *v))) {
             let rectangle = [u, v];
-            let (metric, finer) = if is_cut {
-                let looks = self.looks(rectangle);
-                (looks.metric, looks.stretch)
-            } else {
-                (metric, stretch)
-            };
+            let Looks { metric, spans, .. } = self.looks(rectangle);
             let set = Set {
                 rectangle,
                 cuts: [u_cuts, v_cuts],
                 metric,
                 surface: self.surface,
-                finer,
+                spans,
                 holds: &|place| is_wanted(place) && clearance.check(place).is_ok(),
                 is_sure: &|place| clearance.surely(place),
             };
@@ -395,6 +402,28 @@ impl Request<'_> {
         }
         Some(low)
     }
+}
+
+/// The spans between knots within a range.
+fn spans(breaks: &[f64], [low, high]: [f64; 2]) -> Vec<[f64; 2]> {
+    let inner = breaks.iter().copied().filter(|knot| *knot > low && *knot < high);
+    let ends: Vec<f64> = std::iter::once(low).chain(inner).chain([high]).collect();
+    ends.windows(2).map(|ends| [ends[0], ends[1]]).collect()
+}
+
+/// Places in each span, with its index.
+fn looks_in(spans: &[[f64; 2]]) -> Vec<(usize, f64)> {
+    let count = LOOKS.div_ceil(spans.len()).max(SPAN_LOOKS);
+    let of_span = |(index, [low, high]): (usize, &[f64; 2])| {
+        let last = if index + 1 == spans.len() {
+            1.0
+        } else {
+            1.0 - BELOW
+        };
+        let (low, length) = (*low, high - low);
+        (0..=count).map(move |place| (index, low + length * (place as f64 / count as f64).min(last)))
+    };
+    spans.iter().enumerate().flat_map(of_span).collect()
 }
 
 /// What can be reached of places, and why not.

@@ -202,6 +202,55 @@ fn a_region_leaves_out_what_is_between_the_places_of_its_grid() {
     }
 }
 
+/// 40 pieces of a plane, one 20 mm long, the others 0.5 mm, at knots one apart: a pin on the long one is left out wherever it is in the grid.
+#[test]
+fn a_region_leaves_out_a_pin_on_a_long_piece_among_short_ones() {
+    let tool = Tool::new(4.0, &ToolBody::default());
+    let long = 4_u8;
+    let mut profile = vec![[0.0, 0.0]];
+    for piece in 0..40 {
+        profile.push([
+            profile[piece][0] + if piece == usize::from(long) { 20.0 } else { 0.5 },
+            0.0,
+        ]);
+    }
+    let inner = (0..=40).map(f64::from);
+    let knots: Vec<f64> = [0.0].into_iter().chain(inner).chain([40.0]).collect();
+    let (_, surface) = extruded(1, &knots, &profile);
+    let length = profile[40][0];
+    let outer = [[0.0, -10.0], [length, -10.0], [length, 10.0], [0.0, 10.0]];
+    for case in 0..4_i32 {
+        let at = dvec3(5.0 + 3.7 * f64::from(case), 0.3 * f64::from(case), 0.0);
+        let ring = |z: f64, turn: f64| -> Vec<Edge> {
+            let ring = circle(0.01, z, turn);
+            vec![ring[0].iter().map(|point| *point + at).collect()]
+        };
+        let corners = outer.map(|[x, y]| dvec3(x, y, 0.0));
+        let side = Surface::Cylinder {
+            origin: at,
+            x: 0.01 * DVec3::X,
+            y: 0.01 * DVec3::Y,
+            z: DVec3::Z,
+        };
+        let pin = [
+            face(1, plane(0.0), vec![polygon(&corners), ring(0.0, -1.0)], 1.0),
+            face(2, side, vec![ring(0.0, 1.0), ring(0.0021, -1.0)], 1.0),
+            face(3, plane(0.0021), vec![ring(0.0021, 1.0)], 1.0),
+        ];
+        // Parameters of the surface: v is 0 to 1 across, u a knot for each piece.
+        let u = |x: f64| f64::from(long) + (x - 2.0) / 20.0;
+        let place = |x: f64, y: f64| [u(x), (y + 10.0) / 20.0];
+        let trimmed = vec![vec![[0.0, 0.0], [40.0, 0.0], [40.0, 1.0], [0.0, 1.0]]];
+        let made = region(&pin, &surface, &trimmed, &tool);
+        let inside = crate::inside::Inside::new(&made.loops);
+        assert!(!inside.contains(place(at.x + 0.02, at.y)), "case {case}");
+        assert!(
+            inside.contains(place(at.x + 0.2, at.y)) && inside.contains(place(at.x, at.y - 0.2)),
+            "case {case}"
+        );
+    }
+}
+
 /// A boss lower than the ball's centre is touched by the ball's flank: at the height h at the distance sqrt(r^2 - (r - h)^2).
 #[test]
 fn a_low_boss_is_passed_by_the_balls_flank() {
@@ -346,6 +395,44 @@ fn distances_are_those_of_the_surfaces() {
         part.beside(dvec3(11.0, 0.0, 0.0), [12.5, 1e9], 30.0, false)
             .is_none()
     );
+}
+
+/// Beside the apex of a cone, which is at the lower end of v, all distances are those of the flank.
+#[test]
+fn distances_beside_an_apex_are_those_of_the_flank() {
+    let (apex, base, height) = (dvec3(25.0, 25.0, 8.0), 0.8, 8.0);
+    let cone = Surface::Cone {
+        origin: apex,
+        x: DVec3::X,
+        y: -DVec3::Y,
+        z: -DVec3::Z,
+        radius: 0.0,
+        slope: base / height,
+    };
+    let rim: Edge = circle(base, 0.0, -1.0)
+        .concat()
+        .iter()
+        .map(|at| *at + dvec3(25.0, 25.0, 0.0))
+        .collect();
+    let tip = dvec3(25.0, 25.0, 8.0);
+    for sense in [1.0, -1.0] {
+        let part = Part::new(&[face(1, cone.clone(), vec![vec![rim.clone()]], sense)]);
+        assert_eq!(part.missing, []);
+        let mut far = Vec::new();
+        for turn in 1..24 {
+            let angle = TAU * f64::from(turn) / 24.0;
+            let out = dvec3(angle.cos(), angle.sin(), 0.0);
+            let along = (base * out - height * DVec3::Z).normalize();
+            let away = (height * out + base * DVec3::Z).normalize();
+            for foot in [0.02, 0.05, 0.1, 0.2, 0.3, 0.5] {
+                let point = tip + foot * along + 0.45 * away;
+                let found = part.nearest(point, 3.0, None, false).expect("near the cone");
+                far.push((found.distance - 0.45).abs());
+            }
+        }
+        let worst = far.iter().copied().fold(0.0, f64::max);
+        assert!(worst < 1e-3, "{worst} mm");
+    }
 }
 
 /// Passes one step-over apart on a plane leave the scallop height between them.

@@ -110,12 +110,13 @@ impl Tool {
         Self { radius, columns }
     }
 
-    /// This tool with every part at least as thick as the ball.
+    /// This tool with every part at least as thick as the ball and all parts below it: where it is clear, it is clear straight above.
     #[must_use]
     pub fn wide(&self) -> Self {
-        let columns = self.columns.iter().map(|column| Column {
-            radius: column.radius.max(self.radius),
-            ..*column
+        let mut radius = self.radius;
+        let columns = self.columns.iter().map(|column| {
+            radius = radius.max(column.radius);
+            Column { radius, ..*column }
         });
         Self {
             radius: self.radius,
@@ -138,5 +139,31 @@ impl Tool {
             radius,
             columns: columns.collect(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use job::HolderPart;
+
+    use super::*;
+
+    /// A thin shank, and a holder that narrows from 50 to 30 mm and widens to 40.
+    #[test]
+    fn a_wide_tool_does_not_narrow_upwards() {
+        let part = |diameter: f64, length_mm: f64| HolderPart {
+            diameter_mm: [diameter, diameter],
+            length_mm,
+        };
+        let body = ToolBody {
+            shank_mm: Some(4.0),
+            length_mm: Some(40.0),
+            holder: vec![part(50.0, 20.0), part(30.0, 60.0), part(60.0, 5.0)],
+            ..ToolBody::default()
+        };
+        let radii = |tool: &Tool| -> Vec<f64> { tool.columns.iter().map(|column| column.radius).collect() };
+        let tool = Tool::new(3.0, &body);
+        assert_eq!(radii(&tool), [2.0, 25.0, 15.0, 30.0, 30.0]);
+        assert_eq!(radii(&tool.wide()), [3.0, 25.0, 25.0, 30.0, 30.0]);
     }
 }

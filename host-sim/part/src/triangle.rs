@@ -22,7 +22,8 @@ fn weights(ab: DVec3, ac: DVec3, ap: DVec3) -> [f64; 2] {
         return [1.0, 0.0];
     }
     let vc = d1 * d4 - d3 * d2;
-    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
+    // Where the first two corners are one, both are 0, and the nearest point is on another side.
+    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 && d1 > d3 {
         return [d1 / (d1 - d3), 0.0];
     }
     let cp = ap - ac;
@@ -178,4 +179,51 @@ pub(crate) fn edge_beside(p: DVec3, [a, b]: [DVec3; 2], z: [f64; 2]) -> Option<f
     let to = if high.z > z[1] { at(z[1]) } else { high };
     let flat = |q: DVec3| DVec3::new(q.x, q.y, 0.0);
     Some(edge_nearest(flat(p), [flat(from), flat(to)]).0)
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::dvec3;
+
+    use super::*;
+
+    /// A side of two equal corners makes a triangle a line, whichever side it is.
+    #[test]
+    fn a_triangle_with_two_equal_corners_has_the_distances_of_a_line() {
+        let (pole, end) = (dvec3(25.0, 25.0, 8.0), dvec3(26.0, 25.0, 5.0));
+        let points = [
+            dvec3(27.85, 25.0, 7.0),
+            dvec3(25.4, 25.3, 6.4),
+            dvec3(24.0, 25.0, 11.0),
+            dvec3(27.0, 26.0, 1.0),
+        ];
+        for corners in [
+            [pole, pole, end],
+            [pole, end, pole],
+            [end, pole, pole],
+            [pole, pole, pole],
+        ] {
+            for p in points {
+                let (found, [x, y]) = nearest(p, corners);
+                let wanted = (0..=1000)
+                    .map(|k| {
+                        p.distance(corners[0].lerp(
+                            if corners[0] == corners[1] {
+                                corners[2]
+                            } else {
+                                corners[1]
+                            },
+                            f64::from(k) / 1000.0,
+                        ))
+                    })
+                    .fold(f64::INFINITY, f64::min);
+                assert!(
+                    (found - wanted).abs() < 1e-3,
+                    "{corners:?} {p}: {found}, {wanted}"
+                );
+                let at = corners[0] * (1.0 - x - y) + corners[1] * x + corners[2] * y;
+                assert!((at.distance(p) - found).abs() < 1e-9, "{corners:?} {p}: {at}");
+            }
+        }
+    }
 }

@@ -79,7 +79,7 @@ impl From<ExportError> for Failure {
 }
 
 /// Gives the job the clearance and the spindle's speed of the command line.
-fn override_machine(job: &mut Job, arguments: &Arguments) -> Result<()> {
+fn override_machine(job: &mut Job, arguments: &Arguments, profile: Option<&MachineProfile>) -> Result<()> {
     if let Some(clearance_mm) = arguments.clearance {
         if job.machine.safe_z_mm.is_some() {
             let what = "--clearance and safe_z_mm: the job gives the safe height itself";
@@ -97,12 +97,31 @@ fn override_machine(job: &mut Job, arguments: &Arguments) -> Result<()> {
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
-            reason = "above 0; saturates"
+            reason = "above 0, at most 1e6"
         )]
         let rpm = rpm.round().max(1.0) as u32;
+        check_rpm(rpm, profile)?;
         job.machine.spindle = Some(Spindle { rpm, ..own });
     }
     Ok(())
+}
+
+/// Checks the speed of the command line as that of a job is.
+fn check_rpm(rpm: u32, profile: Option<&MachineProfile>) -> Result<()> {
+    match profile.map(|profile| profile.spindle) {
+        Some(None) => Err(Failure::input(
+            format!("--spindle {rpm}: the machine's profile has no spindle"),
+            "leave it out, or add [spindle] with max_rpm to the profile",
+        )),
+        Some(Some(drive)) if rpm > drive.max_rpm => Err(Failure::input(
+            format!(
+                "--spindle {rpm} exceeds the machine's profile: {} there",
+                drive.max_rpm
+            ),
+            "lower it",
+        )),
+        _ => Ok(()),
+    }
 }
 
 /// Time from switching the spindle on to the first motion, s.
@@ -116,7 +135,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let (mut job, _) = home::load(&arguments.job, profile.as_ref(), None, None)?;
     super::whole_surface(&job, "export")?;
     output_file::check(&arguments.output, arguments.force)?;
-    override_machine(&mut job, arguments)?;
+    override_machine(&mut job, arguments, profile.as_ref())?;
     let options = Options {
         dialect: arguments.format,
         kind: arguments.approach,

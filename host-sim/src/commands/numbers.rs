@@ -17,9 +17,10 @@ fn number(text: &str, expected: &str, is_valid: impl Fn(f64) -> bool) -> Result<
         .ok_or_else(|| format!("expected {expected}"))
 }
 
-/// Turns a minute, above 0.
+/// Turns a minute, above 0 and at most those of a job.
 pub(super) fn rpm(text: &str) -> Result<f64, String> {
-    number(text, "turns a minute above 0, such as 12000", |rpm| rpm > 0.0)
+    let expected = "turns a minute above 0 and at most 1e6, such as 12000";
+    number(text, expected, |rpm| rpm > 0.0 && rpm <= 1e6)
 }
 
 /// A speed of the axes in mm/s: above 0, and within what 32 bits hold.

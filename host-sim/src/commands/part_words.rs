@@ -10,9 +10,12 @@ use super::region_words;
 
 /// Where the tool enters the part.
 pub(super) fn marks(check: &PartCheck) -> Vec<Mark> {
-    let found = check.deepest.iter().flatten().flatten();
-    let deep = found.filter(|found| check.is_too_deep(found));
-    deep.map(|found| Mark {
+    // Links are known by their places alone.
+    let ticks = [check.tick, None];
+    let found = check.deepest.iter().flatten().zip(ticks);
+    let found = found.filter_map(|(found, tick)| Some((found.as_ref()?, tick)));
+    let deep = found.filter(|(found, _)| check.is_too_deep(found));
+    deep.map(|(found, tick)| Mark {
         what: format!(
             "{} {:.4} mm in face {}",
             found.part.name(),
@@ -20,7 +23,7 @@ pub(super) fn marks(check: &PartCheck) -> Vec<Mark> {
             found.face
         ),
         place_mm: found.centre_mm,
-        tick: check.tick,
+        tick,
     })
     .collect()
 }
@@ -102,4 +105,42 @@ pub(super) fn json(job: &Job, check: &PartCheck) -> Value {
         },
         "face": job.origin.reach().map(region_words::json),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+    use part::{Leftover, Reason};
+
+    use super::*;
+
+    /// A place between passes does not have the tick of the deepest place on passes, which may be within the tolerance.
+    #[test]
+    fn a_mark_has_the_tick_of_its_own_place() {
+        let deepest = |depth_mm: f64| Deepest {
+            depth_mm,
+            part: Reason::Ball,
+            centre_mm: DVec3::new(depth_mm, 0.0, 0.0),
+            index: 0,
+            face: 3,
+        };
+        let ticks = |depths: [f64; 2]| -> Vec<(f64, Option<u64>)> {
+            let check = PartCheck {
+                deepest: Some(depths.map(|depth| Some(deepest(depth)))),
+                counts: [1, 1],
+                tolerance_mm: 0.002,
+                unknown: 0,
+                leftover: Leftover::default(),
+                tick: Some(7),
+                failures: Vec::new(),
+                warnings: Vec::new(),
+            };
+            marks(&check)
+                .iter()
+                .map(|mark| (mark.place_mm.x, mark.tick))
+                .collect()
+        };
+        assert_eq!(ticks([0.0006, 0.1]), [(0.1, None)]);
+        assert_eq!(ticks([0.1, 0.0006]), [(0.1, Some(7))]);
+    }
 }

@@ -55,7 +55,7 @@ fn numbers_out_of_range_get_a_remedy() {
     gets_a_remedy(&[
         (
             "export job.toml --format linuxcnc --clearance -3 -o x",
-            &["'-3' for '--clearance <MM>'", "a length in mm above 0"],
+            &["'-3' for '--clearance <MM>'", "a height in mm from 0 to 1000"],
         ),
         (
             "export job.toml --format linuxcnc --spindle inf -o x",
@@ -187,6 +187,31 @@ fn jobs_of_a_region_are_not_exported() {
 }
 
 /// The approaches that export can use are those in its help.
+/// A speed of the command line is within the machine's profile, as one of the job is.
+#[test]
+fn export_refuses_a_spindle_beyond_the_profile() {
+    let folder = folder_with("torus", &[("scallop_mm = ", "scallop_mm = 0.5 #")]);
+    let machine = "[machine]\nsteps_per_mm = [400, 400, 400]\n";
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    write("bare.toml", machine);
+    write("mill.toml", &format!("{machine}[spindle]\nmax_rpm = 12000\n"));
+    let export = "export job.toml --format grbl --force -o a.nc --spindle";
+    for (arguments, says) in [
+        (
+            "24000 --machine mill.toml",
+            "--spindle 24000 exceeds the machine's profile: 12000 there",
+        ),
+        ("9000 --machine bare.toml", "the machine's profile has no spindle"),
+        ("1e12", "at most 1e6"),
+    ] {
+        let output = run(folder.path(), &format!("{export} {arguments}"));
+        assert_eq!(output.status.code(), Some(2), "{arguments}: {}", out(&output));
+        assert!(err(&output).contains(says), "{arguments}: {}", err(&output));
+    }
+    let output = run(folder.path(), &format!("{export} 12000 --machine mill.toml"));
+    assert_eq!(output.status.code(), Some(0), "{}", err(&output));
+}
+
 #[test]
 fn the_help_of_export_names_its_approaches() {
     let folder = folder_with("torus", &[]);

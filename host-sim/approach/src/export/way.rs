@@ -9,7 +9,9 @@ use verify::reach::{self, Motion, Obstacle, ReachFinding};
 
 use crate::gcode::{Blocks, Cut, RESOLUTION_MM};
 
-/// Parts of a cut that are kept as positions: an arc is less than half a turn, and holds a tolerance of micrometres.
+/// Distance of an arc from the chords that are kept of it, mm.
+const CHORD_MM: f64 = 2.5e-4;
+/// Least number of parts of a cut that are kept as positions.
 const CUT_PARTS: u32 = 8;
 
 /// Writes the blocks of a program, and keeps the positions of the ball's centre.
@@ -60,8 +62,9 @@ impl<'a> Writer<'a> {
         self.blocks.cut(cut);
         if let [Some(x), Some(y), Some(z)] = self.at {
             let from = DVec3::new(x, y, z);
-            for part in 1..=CUT_PARTS {
-                self.add(cut.at(from, f64::from(part) / f64::from(CUT_PARTS)), in_contact);
+            let parts = cut.parts(from, CHORD_MM).max(CUT_PARTS);
+            for part in 1..=parts {
+                self.add(cut.at(from, f64::from(part) / f64::from(parts)), in_contact);
             }
         }
     }
@@ -183,4 +186,36 @@ fn in_the_way(job: &Job, finding: &ReachFinding) -> JobError {
         ),
         finding.remedy(),
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gcode::{FeedMode, Plane, Shape};
+
+    /// An arc of 45 degrees on a radius of 200 mm whose highest place is between its eighths.
+    #[test]
+    fn an_arc_is_kept_to_its_outermost_place() {
+        let radius_mm = 200.0;
+        let at = |degrees: f64| {
+            let (sine, cosine) = degrees.to_radians().sin_cos();
+            DVec3::new(radius_mm * cosine, radius_mm * sine, 3.0)
+        };
+        let mut out = String::new();
+        let mut writer = Writer::new(Blocks::new(&mut out, FeedMode::G94));
+        let from = 90.0 - 22.5 - 45.0 / 16.0;
+        writer.rapid(at(from).to_array().map(Some));
+        writer.cut(&Cut {
+            to_mm: at(from + 45.0),
+            length_mm: radius_mm * 45_f64.to_radians(),
+            speed_mm_s: 10.0,
+            shape: Shape::Arc {
+                plane: Plane::Xy,
+                centre_mm: DVec3::new(0.0, 0.0, 3.0),
+                clockwise: false,
+            },
+        });
+        let short_mm = radius_mm - writer.high_mm.y;
+        assert!(short_mm < 1.5 * CHORD_MM, "{short_mm} mm");
+    }
 }
