@@ -367,7 +367,9 @@ impl<'m> Translation<'m> {
         if let Some(first) = unread.first() {
             let count = unread.len();
             let warning = format!("faces of the file that were not read: {count}, the first is {first}");
-            model.warnings.insert(0, warning);
+            // Of a file without a face the first warning is the reason.
+            let at = usize::from(model.faces.is_empty()).min(model.warnings.len());
+            model.warnings.insert(at, warning);
         }
         unread.len()
     }
