@@ -124,7 +124,8 @@ pub(crate) fn decode(
         )
     })?;
     cross_check(file, decoded.ir(), stated)?;
-    let mut model = Translation::new(decoded.ir()).model(file, stated)?;
+    let translation = Translation::new(decoded.ir());
+    let mut model = translation.model(file, stated)?;
     for warning in &mut model.warnings {
         explain(
             warning,
@@ -161,6 +162,20 @@ pub(crate) fn decode(
     model
         .warnings
         .extend(telling.take(room).map(|loss| shortened(&attributed(loss))));
+    let unread = translation.unread_faces(stated);
+    if let Some(first) = unread.first() {
+        let count = unread.len();
+        // Of a file without a face the first warning is the reason.
+        let at = if model.faces.is_empty() {
+            model.warnings.len()
+        } else {
+            0
+        };
+        model.warnings.insert(
+            at,
+            format!("faces of the file that were not read: {count}, the first is {first}"),
+        );
+    }
     Ok(model)
 }
 
@@ -347,15 +362,15 @@ impl<'m> Translation<'m> {
         model.solids = solids.all();
         let named = model.left_out;
         let owned = self.lone_surfaces(&mut model, stated);
-        let unread = self.unread_faces(&mut model, stated);
+        let unread = self.unread_faces(stated).len();
         // A face that was not read may be counted already, by its surface.
         model.left_out = model.left_out.max((named + unread).saturating_sub(owned));
         model.warnings.truncate(WARNINGS_MAX);
         Ok(model)
     }
 
-    /// Number of faces that the file has and of which the reader gave nothing but, perhaps, their surfaces.
-    fn unread_faces(&self, model: &mut Model, stated: &dyn Stated) -> usize {
+    /// Faces that the file has and of which the reader gave nothing but, perhaps, their surfaces.
+    fn unread_faces(&self, stated: &dyn Stated) -> Vec<String> {
         let read: HashSet<String> = self
             .source
             .faces
@@ -364,14 +379,7 @@ impl<'m> Translation<'m> {
             .collect();
         let mut unread = stated.faces();
         unread.retain(|name| !read.contains(name));
-        if let Some(first) = unread.first() {
-            let count = unread.len();
-            let warning = format!("faces of the file that were not read: {count}, the first is {first}");
-            // Of a file without a face the first warning is the reason.
-            let at = usize::from(model.faces.is_empty()).min(model.warnings.len());
-            model.warnings.insert(at, warning);
-        }
-        unread.len()
+        unread
     }
 
     /// Surfaces without a face, common in IGES files. Returns how many of them are taken in with the boundary of a face that was not read.
