@@ -533,6 +533,9 @@ fn long_narrow_strips() {
             curved <= straight + 2,
             "{length_mm}: {curved} passes, {straight} straight ones"
         );
-        assert!(excess <= error.max(ERROR_SHARE_MAX), "{length_mm}: {excess}");
+        assert!(
+            excess <= error && error <= ERROR_SHARE_MAX,
+            "{length_mm}: {excess}"
+        );
     }
 }
