@@ -132,11 +132,13 @@ fn verify_prints_an_object_of_the_schema_for_every_outcome() {
         "line.toml",
         &torus.replace("feed_mm_min = 600", "feed_mm_min = -1"),
     );
+    write("region.toml", include_str!("../../../jobs/region.toml"));
     for (arguments, code, definition) in [
         ("verify job.toml --json", 0, "verification"),
         ("verify limits.toml --json", 0, "verification"),
         ("verify fault.toml --json", 1, "verification"),
         ("verify curved.toml --json", 0, "verification"),
+        ("verify region.toml --json", 0, "verification"),
         ("verify line.toml --json", 2, "error"),
         ("verify nothing.toml --json", 2, "error"),
         ("verify --json", 2, "error"),
