@@ -41,8 +41,11 @@ const SPACING_PARTS: f32 = 128.0;
 
 /// Error of a derivative by differences of positions rounded to a nanometre, times the cell's length to its power: three standard deviations
 /// at the end of a window.
-pub(crate) const FIRST_NOISE: f32 = 2e-6;
+const FIRST_NOISE: f32 = 2e-6;
 const SECOND_NOISE: f32 = 12e-6;
+const THIRD_NOISE: f32 = 60e-6;
+/// The same by differences of first derivatives in single precision: of the first, of the second times the length, of the third times its square.
+const DIRECTION_NOISE: [f32; 3] = [1e-6, 1.6e-6, 4e-6];
 
 /// Least length of a cell, mm: a shorter one has differences of rounded positions.
 pub(crate) const CELL_MIN_MM: f32 = 0.15;
@@ -242,12 +245,15 @@ pub(crate) const WINDOW: usize = 5;
 pub(crate) struct Window {
     /// Position, nm, and arc, mm; the oldest first.
     points: [([i32; 3], f32); WINDOW],
+    /// First derivative by the arc at each, if it is known.
+    directions: [Option<[f32; 3]>; WINDOW],
     count: usize,
 }
 
 impl Window {
     pub(crate) const EMPTY: Self = Self {
         points: [([0; 3], 0.0); WINDOW],
+        directions: [None; WINDOW],
         count: 0,
     };
 
@@ -267,20 +273,53 @@ impl Window {
         (self.arc_mm(last) - self.arc_mm(0)) / intervals
     }
 
-    /// Appends a position; the oldest is dropped.
-    pub(crate) fn push(&mut self, centre_nm: [i32; 3], arc_mm: f32) {
+    /// Appends a position with the first derivative there, if it is known; the oldest is dropped.
+    pub(crate) fn push(&mut self, centre_nm: [i32; 3], arc_mm: f32, direction: Option<[f32; 3]>) {
         if self.count == WINDOW {
             let [_, b, c, d, e] = self.points;
             self.points = [b, c, d, e, e];
+            let [_, b, c, d, e] = self.directions;
+            self.directions = [b, c, d, e, e];
             self.count -= 1;
         }
         if let Some(place) = self.points.get_mut(self.count) {
             *place = (centre_nm, arc_mm);
+            if let Some(place) = self.directions.get_mut(self.count) {
+                *place = direction;
+            }
             self.count += 1;
         }
     }
 
-    /// Derivatives at one of the positions, of the polynomial through all of them: Newton's divided differences.
+    /// Whether the first derivative is known at all of the positions.
+    pub(crate) fn has_directions(&self) -> bool {
+        let directions = self.directions.get(..self.count).unwrap_or(&[]);
+        directions.iter().all(Option::is_some)
+    }
+
+    /// Errors of the three derivatives, by rounding.
+    pub(crate) fn noise(&self) -> [f32; 3] {
+        let inverse = 1.0 / self.spacing_mm().at_least(1e-3);
+        let [square, cube] = [inverse * inverse, inverse * inverse * inverse];
+        if self.has_directions() {
+            let [first, second, third] = DIRECTION_NOISE;
+            [first, second * inverse, third * square]
+        } else {
+            [FIRST_NOISE * inverse, SECOND_NOISE * square, THIRD_NOISE * cube]
+        }
+    }
+
+    /// Length of the cells that the derivatives are taken over, mm, as far as rounding matters; see [`Stations::note_spacing`].
+    pub(crate) fn noise_spacing_mm(&self) -> f32 {
+        if self.has_directions() {
+            f32::MAX
+        } else {
+            self.spacing_mm()
+        }
+    }
+
+    /// Derivatives at one of the positions, of the polynomial through all of them, or through the first derivatives where these are known: Newton's divided
+    /// differences.
     pub(crate) fn derivatives(&self, at: usize) -> Derivatives {
         let mut q = [[0.0; 3]; 3];
         let points = self.points.get(..self.count).unwrap_or(&[]);
@@ -291,15 +330,28 @@ impl Window {
         for (arc, (_, from_start)) in arcs.iter_mut().zip(points) {
             *arc = from_start - start;
         }
+        let has_directions = self.has_directions();
         for (axis, q) in q.iter_mut().enumerate() {
             let mut differences = [0.0; WINDOW];
-            for (difference, (centre, _)) in differences.iter_mut().zip(points) {
-                let of = |centre: &[i32; 3]| centre.get(axis).copied().unwrap_or(0);
-                *difference = nm_to_mm(of(centre).wrapping_sub(of(origin)));
+            if has_directions {
+                for (difference, direction) in differences.iter_mut().zip(self.directions.iter().flatten()) {
+                    *difference = direction.get(axis).copied().unwrap_or(0.0);
+                }
+            } else {
+                for (difference, (centre, _)) in differences.iter_mut().zip(points) {
+                    let of = |centre: &[i32; 3]| centre.get(axis).copied().unwrap_or(0);
+                    *difference = nm_to_mm(of(centre).wrapping_sub(of(origin)));
+                }
             }
             divide(&mut differences, &arcs, points.len());
-            let [_, first, second, third] = taylor(&differences, &arcs, points.len());
-            *q = [first, 2.0 * second, 6.0 * third];
+            let series = taylor(&differences, &arcs, points.len());
+            *q = if has_directions {
+                let [first, second, third, _] = series;
+                [first, second, 2.0 * third]
+            } else {
+                let [_, first, second, third] = series;
+                [first, 2.0 * second, 6.0 * third]
+            };
         }
         q
     }
