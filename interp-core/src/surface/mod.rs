@@ -501,3 +501,6 @@ pub(crate) fn path_factor(edges: Edges, at: &IsoLine) -> (f32, f32) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -76,13 +76,16 @@ enum Task {
 
 /// Cycles of the tasks, by the pessimistic model of `cargo sim budget`.
 mod cycles {
-    pub(super) use crate::pass::scan::cycles::{ESTIMATE, NEXT, PATCH, STATION};
+    pub(super) use crate::pass::scan::cycles::{ESTIMATE, NEXT, PATCH};
+
+    /// A station of a straight pass, with the direction of the centre's path.
+    pub(super) const STATION: u32 = crate::pass::scan::cycles::STATION + 600;
 
     /// On a front: the first patch of a stretch, a later piece, the search for it, a station.
     pub(super) const FRONT_PATCH: u32 = 5_600;
     pub(super) const PIECE: u32 = 5_000;
     pub(super) const EXTEND: u32 = 3_500;
-    pub(super) const FRONT_STATION: u32 = 4_800;
+    pub(super) const FRONT_STATION: u32 = 5_400;
     pub(super) const DERIVATIVES: u32 = 3_400;
     pub(super) const SLOW_DOWN: u32 = 5_000;
     pub(super) const CLOSE: u32 = 1_700;
