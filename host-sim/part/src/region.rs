@@ -120,7 +120,7 @@ impl Border {
         let mut bound = within;
         self.tree.nearest(
             &mut bound,
-            |block| block.distance(point),
+            |block| block.distance_squared(point),
             |index, bound| {
                 let (distance, _) = edge_nearest(point, self.edges[index]);
                 if distance < *bound {
