@@ -207,7 +207,7 @@ impl Part {
     pub fn nearest(&self, point: DVec3, below: f64, own: Option<&OwnContact>, any: bool) -> Option<Near> {
         let mut found: Option<Near> = None;
         let mut bound = below;
-        let from = |block: &Block| block.distance(point);
+        let from = |block: &Block| block.distance_squared(point);
         self.edge_tree.nearest(&mut bound, from, |index, bound| {
             if any && found.is_some() {
                 return;
@@ -229,6 +229,9 @@ impl Part {
                 return;
             }
             let cell = &self.cells[index];
+            if cell.is_beyond(point, *bound) {
+                return;
+            }
             let face = cell.face as usize;
             let skip = own
                 .filter(|own| own.face == face)
@@ -249,7 +252,7 @@ impl Part {
     pub fn beside(&self, point: DVec3, z: [f64; 2], below: f64, any: bool) -> Option<Near> {
         let mut found: Option<Near> = None;
         let mut bound = below;
-        let from = |block: &Block| block.beside(point, z);
+        let from = |block: &Block| block.beside_squared(point, z);
         self.edge_tree.nearest(&mut bound, from, |index, bound| {
             if any && found.is_some() {
                 return;
@@ -272,6 +275,9 @@ impl Part {
                 return;
             }
             let cell = &self.cells[index];
+            if cell.is_beside(point, z[0], *bound) {
+                return;
+            }
             let face = cell.face as usize;
             if cell.lower(&measure, self.inside(face), bound, any).is_some() {
                 found = Some(Near {
@@ -356,7 +362,10 @@ impl Maker<'_> {
         let sizes = cell.sizes();
         let is_large = sizes[0].max(sizes[1]) > SIZE_MM;
         if left == 0 || (cell.deviation <= DEVIATION_MM && model <= MODEL_MM && !is_large) {
-            out.push(cell);
+            out.push(match self.inside.filter(|_| is_cut) {
+                Some(inside) => cell.trimmed_by(inside, &edges),
+                None => cell,
+            });
             return;
         }
         let bends = cell.bends();

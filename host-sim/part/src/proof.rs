@@ -122,7 +122,7 @@ impl Passes {
         let mut bound = 1.5 * radius;
         self.tree.nearest(
             &mut bound,
-            |block| block.distance(place),
+            |block| block.distance_squared(place),
             |index, bound| {
                 let (distance, centre) = edge_nearest(place, self.pieces[index]);
                 if distance >= *bound {

@@ -48,20 +48,23 @@ impl Block {
         }
     }
 
-    /// Distance of a point.
+    /// Square of the distance of a point.
     #[must_use]
-    pub fn distance(&self, to: DVec3) -> f64 {
-        (self.low - to).max(to - self.high).max(DVec3::ZERO).length()
+    pub fn distance_squared(&self, to: DVec3) -> f64 {
+        (self.low - to)
+            .max(to - self.high)
+            .max(DVec3::ZERO)
+            .length_squared()
     }
 
-    /// Distance of the part of the box between two heights from a vertical line through a point; infinite where there is no such part.
+    /// Square of the distance of the part of the box between two heights from a vertical line through a point; infinite where there is no such part.
     #[must_use]
-    pub fn beside(&self, to: DVec3, z: [f64; 2]) -> f64 {
+    pub fn beside_squared(&self, to: DVec3, z: [f64; 2]) -> f64 {
         if self.high.z < z[0] || self.low.z > z[1] {
             return f64::INFINITY;
         }
         let gap = (self.low - to).max(to - self.high).max(DVec3::ZERO);
-        gap.x.hypot(gap.y)
+        gap.x * gap.x + gap.y * gap.y
     }
 }
 
@@ -125,23 +128,24 @@ impl Tree {
         self.split(blocks, high, first + half);
     }
 
-    /// Visits the items of all boxes that `distance` puts nearer than the bound, the nearer boxes first. `visit` may lower the bound.
+    /// Visits the items of all boxes whose squared distance is below that of the bound, the nearer boxes first. `visit` may lower the bound.
     pub(crate) fn nearest(
         &self,
         bound: &mut f64,
-        distance: impl Fn(&Block) -> f64,
+        distance_squared: impl Fn(&Block) -> f64,
         mut visit: impl FnMut(usize, &mut f64),
     ) {
+        let square = |bound: f64| bound.max(0.0) * bound;
         let mut open = [(0_u32, 0.0_f64); DEPTH];
         let mut count = 0;
         if let Some(root) = self.nodes.first() {
-            open[0] = (0, distance(&root.block));
+            open[0] = (0, distance_squared(&root.block));
             count = 1;
         }
         while count > 0 {
             count -= 1;
             let (index, far) = open[count];
-            if far >= *bound {
+            if far >= square(*bound) {
                 continue;
             }
             let node = &self.nodes[index as usize];
@@ -152,13 +156,14 @@ impl Tree {
                 }
                 continue;
             }
-            let mut children =
-                [index + 1, node.at].map(|child| (child, distance(&self.nodes[child as usize].block)));
+            let mut children = [index + 1, node.at]
+                .map(|child| (child, distance_squared(&self.nodes[child as usize].block)));
             if children[0].1 < children[1].1 {
                 children.swap(0, 1);
             }
+            let square = square(*bound);
             for child in children {
-                if child.1 < *bound {
+                if child.1 < square {
                     open[count] = child;
                     count += 1;
                 }

@@ -133,9 +133,9 @@ pub(crate) fn beside(p: DVec3, triangle: [DVec3; 3], z: [f64; 2]) -> Option<(f64
             0.0
         };
         let near = mixed(&a, &b, share);
-        let distance = near.x.hypot(near.y);
-        if distance < best.0 {
-            best = (distance, near.weights);
+        let square = near.x * near.x + near.y * near.y;
+        if square < best.0 {
+            best = (square, near.weights);
         }
         inside ^= (a.y > 0.0) != (b.y > 0.0) && 0.0 < a.x - dx * a.y / dy;
     }
@@ -149,7 +149,8 @@ pub(crate) fn beside(p: DVec3, triangle: [DVec3; 3], z: [f64; 2]) -> Option<(f64
         ];
         return Some((0.0, weights));
     }
-    Some(best)
+    let (square, weights) = best;
+    Some((square.sqrt(), weights))
 }
 
 /// Distance of a straight edge from a point, and the nearest point.
