@@ -5,11 +5,11 @@
 //! Load a job, start it, then call [`Interpolator::tick`] and [`Interpolator::plan`] once a period each:
 //!
 //! ```
-//! use interp_core::{Command, Fault, Header, Interpolator, Sample, State, encode};
+//! use interp_core::{Command, Fault, Header, Interpolator, Sample};
 //!
-//! /// The job's words: see [`interp_core::job`]. Each sample goes to the axes.
+//! /// The job's words: see [`interp_core::job`]. Each sample goes to the axes; a run that ends with a fault is an error.
 //! fn machine(header: &Header, words: &[i32], mut axes: impl FnMut(&Sample)) -> Result<(), Fault> {
-//!     // 35 KB besides the store: on a board a `static`.
+//!     // 36 KB besides the store: on a board in a `static`, behind a lock.
 //!     let mut machine = Interpolator::<[i32; 1024]>::new();
 //!     machine.load_begin(header, words.len() as u32)?;
 //!     machine.load_words(0, words)?;
@@ -18,13 +18,27 @@
 //!     }
 //!     machine.load_finish()?;
 //!     let mut sample = *machine.tick(Command::Start);
-//!     while !matches!(sample.state, State::Finished | State::Faulted) {
+//!     while sample.state.is_under_way() {
 //!         axes(&sample);
 //!         machine.plan();
 //!         sample = *machine.tick(None);
 //!     }
-//!     Ok(())
+//!     machine.fault().map_or(Ok(()), Err)
 //! }
+//! # // A valley of radius 20 mm and a ball of 30 mm: from the start of a pass to where the ball no longer fits.
+//! # use interp_core::{FaultKind, encode};
+//! # let mut c = [[[0.0; 4]; 4]; 3];
+//! # (c[0][1][0], c[1][0][1]) = (40.0, 40.0);
+//! # (c[2][1][0], c[2][2][0]) = (-40.0, 40.0);
+//! # let centred = c.map(|axis| encode::substitute(&axis, [0.0, 1.0], [0.0, 1.0]));
+//! # let mut words = [encode::width(1.0).unwrap(); 54];
+//! # words[2..].copy_from_slice(&encode::polynomial(&centred, Default::default()).unwrap().to_words());
+//! # let mut header = Header { path_spans: 1, side_spans: 1, ball_radius_mm: 30.0, feed_mm_s: 20.0, scallop_mm: 0.01, period_s: 0.001, ..Header::default() };
+//! # let mut samples = 0;
+//! # assert_eq!(machine(&header, &words, |_| samples += 1).map_err(|fault| fault.kind), Err(FaultKind::BallDoesNotFit));
+//! # assert!(samples > 100);
+//! # header.ball_radius_mm = 5.0;
+//! # assert_eq!(machine(&header, &words, |_| ()), Ok(()));
 //! ```
 //!
 //! **On a board** the tick runs in the timer's interrupt and the planning in a task of lower priority. Both need the whole machine, so the tick must not preempt the
