@@ -8,8 +8,8 @@ cd "$(dirname "$0")/.."
 checkout=$PWD
 
 if [ $# -eq 0 ]; then
-    ./dist --as-tested
-    set -- out/isofeed-*-linux.tar.gz
+    archive=$(./dist --as-tested)
+    set -- "$archive"
 fi
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
