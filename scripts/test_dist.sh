@@ -8,8 +8,8 @@ cd "$(dirname "$0")/.."
 checkout=$PWD
 
 if [ $# -eq 0 ]; then
-    ./dist --as-tested
-    set -- out/isofeed-*-linux.tar.gz
+    archive=$(./dist --as-tested)
+    set -- "$archive"
 fi
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
@@ -63,8 +63,8 @@ mv "$prefix/libexec/isofeed/cad-reader" "$folder/cad-reader"
 try 2 'unpack the whole archive' import "$jobs/cad/mouse.step" --list
 mv "$folder/cad-reader" "$prefix/libexec/isofeed/cad-reader"
 
-# No probe is connected; a missing program would be reported instead.
-try 1 'no debug probe was found' flash --board skr-pro
+# The selector matches no probe, so that a board on this machine is not written; a missing program would be reported instead.
+try 1 'no debug probe was found' flash --board skr-pro --probe 0000:0000:nowhere
 try 0 'Usage: isofeed' --help
 try 0 'Example: isofeed import' import --help
 for shell in bash zsh fish; do try 0 'isofeed' completions "$shell"; done

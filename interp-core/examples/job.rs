@@ -1,6 +1,6 @@
 //! A job in thirty lines: a shallow dome, a ball of 5 mm, every pass from the first sample to the last.
 
-use interp_core::{Command, Header, Interpolator, State, encode};
+use interp_core::{Command, Header, Interpolator, encode};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     // z = 20 - (x^2 + y^2)/100 on 80 mm x 60 mm: c[axis][i][j] of u^i v^j in mm, u and v from 0 to 1.
@@ -26,7 +26,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     machine.load_check(0)?;
     machine.load_finish()?;
     let mut sample = *machine.tick(Command::Start);
-    while sample.state == State::Running {
+    while sample.state.is_under_way() {
         machine.plan(); // in what is left of the period: plans ahead
         sample = *machine.tick(None); // once a period: sample.cl_nm is the ball's centre for the axes
     }

@@ -5,11 +5,11 @@
 //! Load a job, start it, then call [`Interpolator::tick`] and [`Interpolator::plan`] once a period each:
 //!
 //! ```
-//! use interp_core::{Command, Fault, Header, Interpolator, Sample, State, encode};
+//! use interp_core::{Command, Fault, Header, Interpolator, Sample};
 //!
-//! /// The job's words: see [`interp_core::job`]. Each sample goes to the axes.
+//! /// The job's words: see [`interp_core::job`]. Each sample goes to the axes; a run that ends with a fault is an error.
 //! fn machine(header: &Header, words: &[i32], mut axes: impl FnMut(&Sample)) -> Result<(), Fault> {
-//!     // 35 KB besides the store: on a board a `static`.
+//!     // 36 KB besides the store: on a board in a `static`, behind a lock.
 //!     let mut machine = Interpolator::<[i32; 1024]>::new();
 //!     machine.load_begin(header, words.len() as u32)?;
 //!     machine.load_words(0, words)?;
@@ -18,21 +18,36 @@
 //!     }
 //!     machine.load_finish()?;
 //!     let mut sample = *machine.tick(Command::Start);
-//!     while !matches!(sample.state, State::Finished | State::Faulted) {
+//!     while sample.state.is_under_way() {
 //!         axes(&sample);
 //!         machine.plan();
 //!         sample = *machine.tick(None);
 //!     }
-//!     Ok(())
+//!     machine.fault().map_or(Ok(()), Err)
 //! }
+//! # // A valley of radius 20 mm and a ball of 30 mm: from the start of a pass to where the ball no longer fits.
+//! # use interp_core::{FaultKind, encode};
+//! # let mut c = [[[0.0; 4]; 4]; 3];
+//! # (c[0][1][0], c[1][0][1]) = (40.0, 40.0);
+//! # (c[2][1][0], c[2][2][0]) = (-40.0, 40.0);
+//! # let centred = c.map(|axis| encode::substitute(&axis, [0.0, 1.0], [0.0, 1.0]));
+//! # let mut words = [encode::width(1.0).unwrap(); 54];
+//! # words[2..].copy_from_slice(&encode::polynomial(&centred, Default::default()).unwrap().to_words());
+//! # let mut header = Header { path_spans: 1, side_spans: 1, ball_radius_mm: 30.0, feed_mm_s: 20.0, scallop_mm: 0.01, period_s: 0.001, ..Header::default() };
+//! # let mut samples = 0;
+//! # assert_eq!(machine(&header, &words, |_| samples += 1).map_err(|fault| fault.kind), Err(FaultKind::BallDoesNotFit));
+//! # assert!(samples > 100);
+//! # header.ball_radius_mm = 5.0;
+//! # assert_eq!(machine(&header, &words, |_| ()), Ok(()));
 //! ```
 //!
 //! **On a board** the tick runs in the timer's interrupt and the planning in a task of lower priority. Both need the whole machine, so the tick must not preempt the
-//! planning: guard it by one lock (an RTIC resource, or the timer's interrupt masked during [`Interpolator::plan`]). A portion takes 28 000 cycles at most, 167 us at 168 MHz, and
-//! delays the tick where it is still under way at the period's end.
+//! planning: guard it by one lock (an RTIC resource as in the crate's README, or the timer's interrupt masked during [`Interpolator::plan`]). The largest portion found takes 36 000 cycles of a
+//! Cortex-M4F by the pessimistic model (28 100 by the nominal one), 214 us at 168 MHz, and delays the tick where it is still under way at the period's end.
 //!
-//! **Memory**: [`Interpolator`] takes 36 152 bytes besides its store. `static MACHINE: Interpolator<[i32; N]> = Interpolator::new()` is zeroes but for a few words. The deepest
-//! stack of the firmware is 14 KB.
+//! **Memory**: [`Interpolator`] takes 36 152 bytes besides its store, which holds the job's words and [`front_words`]. [`Interpolator::new`] is a constant, for a `static` behind a
+//! lock; it is zeroes but for a few words, whose `static` takes flash for all of it: give a large store as one of its own, by [`Interpolator::with_store`]. The deepest stack of the
+//! firmware is 14 KB.
 //!
 //! **Not checked**: that patches join, that widths fit them ([`job`]), gouges away from the contact, fixtures. The desk tool's `verify` measures these.
 //!
@@ -69,13 +84,14 @@
 //!
 //! A folder uses those above it only, beside faults and samples, and `steps` none but `math`; `tests/folders.rs` holds it.
 //!
-//! Nothing here allocates, blocks, panics or uses f64; the same calls give the same bits on every machine. Lengths are mm
+//! Nothing here allocates, blocks or panics, and nothing but [`encode`], for load time, uses f64; the same calls give the same bits on every machine. Lengths are mm
 //! (f32) or nm (i32), angles turns or radians as named, parameters fractions of a span. Build job data from ordinary
 //! coefficients with [`encode`].
 //!
 //! # Accuracy
 //! CL within 5 nm of the exact surface's for a ball of up to 10 mm radius, patches of up to about 100 mm, and first derivatives
-//! at more than 30 degrees (the normal's error grows as 1e-7 rad over their sine); the arc between two samples within
+//! at more than 30 degrees (the normal's error grows as 1e-7 rad over their sine). Not on very narrow patches, because the unit of a patch is that of its longer
+//! side: a ball of 3 mm on patches of 8 mm by 0.025 mm is 15 to 19 nm off. The arc between two samples within
 //! 0.001 % of feed times period where the parametrisation's speed changes by less than a tenth in a period, and a fault before
 //! it could be off by much more than that.
 #![no_std]

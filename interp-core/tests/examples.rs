@@ -80,22 +80,29 @@ fn the_core_is_called_from_c() {
     assert_eq!(run(&mut Command::new(&program)), dome());
 }
 
-/// The README shows code that runs: each block of Rust in it is a part of an example, line by line.
+/// The READMEs show code that compiles: each block of Rust in them is a part of an example, line by line.
 #[test]
-fn the_readme_shows_an_example() {
+fn the_readmes_show_examples() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let read = |path: &Path| std::fs::read_to_string(path).unwrap();
     let trimmed = |text: &str| -> String { text.lines().map(|line| line.trim().to_owned() + "\n").collect() };
-    let readme = read(&root.join("../README.md"));
-    let examples = ["job.rs", "limits.rs"].map(|name| trimmed(&read(&root.join("examples").join(name))));
-    let blocks: Vec<&str> = readme
-        .split("```rust\n")
-        .skip(1)
-        .map(|block| block.split("```").next().unwrap())
-        .collect();
-    assert!(!blocks.is_empty());
-    for block in blocks {
-        let block = trimmed(block);
-        assert!(examples.iter().any(|example| example.contains(&block)), "{block}");
+    let examples = [
+        "examples/job.rs",
+        "examples/limits.rs",
+        "../firmware/examples/minimal.rs",
+    ]
+    .map(|path| trimmed(&read(&root.join(path))));
+    for (readme, count) in [("../README.md", 1), ("README.md", 2)] {
+        let readme = read(&root.join(readme));
+        let blocks: Vec<&str> = readme
+            .split("```rust\n")
+            .skip(1)
+            .map(|block| block.split("```").next().unwrap())
+            .collect();
+        assert_eq!(blocks.len(), count);
+        for block in blocks {
+            let block = trimmed(block);
+            assert!(examples.iter().any(|example| example.contains(&block)), "{block}");
+        }
     }
 }

@@ -35,11 +35,18 @@ pub fn of_tick(record: &Record) -> Operations {
         .fold(Operations::default(), Operations::plus)
 }
 
-/// The operations of a job's ticks; none without a sample.
+/// Whether the tick has a sample of a pass: on a link and at rest steps 2 to 4 are not executed.
+fn has_sample(record: &Record) -> bool {
+    STEPS_2_TO_4_STAGES
+        .iter()
+        .any(|stage| record.stages[*stage as usize].nominal > 0)
+}
+
+/// The operations of a job's samples; none without a sample.
 #[must_use]
 pub fn count(ticks: &Ticks) -> Option<Count> {
     let mut counts: BTreeMap<Operations, u32> = BTreeMap::new();
-    for record in &ticks.records {
+    for record in ticks.records.iter().filter(|record| has_sample(record)) {
         *counts.entry(of_tick(record)).or_default() += 1;
     }
     let all: u32 = counts.values().sum();
@@ -60,6 +67,7 @@ mod tests {
         let mut record = Record::default();
         for (stage, operations) in stages {
             record.operations[*stage as usize] = *operations;
+            record.stages[*stage as usize].nominal = 10;
         }
         record
     }
@@ -72,7 +80,9 @@ mod tests {
             (Stage::PatchChange, Operations::new(100, 100, 100, 100)),
         ];
         let rare = [(Stage::Surface, Operations::new(90, 0, 0, 0))];
-        let records = vec![tick(&usual), tick(&rare), tick(&usual)];
+        // On a link most ticks have no sample.
+        let link = tick(&[(Stage::Feed, Operations::new(7, 7, 0, 0))]);
+        let records = vec![tick(&usual), link, link, tick(&rare), tick(&usual), link];
         let ticks = Ticks {
             records,
             ..Ticks::default()
@@ -83,6 +93,11 @@ mod tests {
             others: 1,
         };
         assert_eq!(count(&ticks), Some(want));
+        let links = Ticks {
+            records: vec![link],
+            ..Ticks::default()
+        };
+        assert_eq!(count(&links), None);
         assert_eq!(count(&Ticks::default()), None);
     }
 }

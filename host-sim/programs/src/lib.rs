@@ -51,7 +51,9 @@ impl Unavailable {
             Self::Nowhere => {
                 "start it as bin/isofeed of an unpacked archive, or by `cargo sim` in a checkout"
             }
-            Self::Build(_) => "run it in a checkout of the project, with its toolchain (./demo sets it up)",
+            Self::Build(_) => {
+                "mend what Cargo reports; where a part of the toolchain is missing, ./demo installs it"
+            }
         }
     }
 }

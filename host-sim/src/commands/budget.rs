@@ -9,7 +9,7 @@ use clap::Args;
 use serde_json::{Map, Value, json};
 
 use super::out::{say, say_part};
-use super::{Failure, Result, along, cannot_write, load, load_without_links, progress, spinner};
+use super::{Failure, Result, along, cannot_write, load, load_without_links, output_file, progress, spinner};
 use cycles::figures::{Figure, Histogram, Model, STEPS_2_TO_4, figures, histogram};
 use cycles::graph::{self, Analysis, EXCEPTION_BYTES};
 use cycles::image::{self, Sizes};
@@ -20,6 +20,8 @@ use cycles::{self, BudgetError, PERIOD_CYCLES, TICKS, chart, golden};
 use machine::remote::qemu;
 use study::operations::PaperRow;
 
+/// The file of --report.
+const CHART: &str = "budget.svg";
 /// Width of a bin of the printed histogram, cycles.
 const BIN_CYCLES: u32 = 50;
 
@@ -60,6 +62,9 @@ pub(super) struct Arguments {
         requires = "search"
     )]
     out: PathBuf,
+    /// Overwrites existing files of --report and --out.
+    #[arg(long)]
+    force: bool,
     /// Prints JSON instead of tables.
     #[arg(long)]
     pub(super) json: bool,
@@ -303,14 +308,24 @@ fn report(arguments: &Arguments, counted: &[Counted]) -> Result<()> {
     let Some(folder) = &arguments.report else {
         return Ok(());
     };
-    let path = folder.join("budget.svg");
-    std::fs::create_dir_all(folder)
-        .and_then(|()| chart::write(&path, counted))
-        .map_err(|error| cannot_write(&path, &error))?;
+    output_file::write_folder(folder, &[CHART], arguments.force, |made| {
+        chart::write(&made.join(CHART), counted)
+    })?;
     if !arguments.json {
-        say!("\nchart: {}", path.display());
+        say!("\nchart: {}", folder.join(CHART).display());
     }
     Ok(())
+}
+
+/// Checks before the work, which takes minutes, that its outputs may be written.
+fn check_outputs(arguments: &Arguments) -> Result<()> {
+    if arguments.search.is_some() {
+        output_file::check(&arguments.out, arguments.force)?;
+    }
+    let report = arguments.report.as_deref();
+    report.map_or(Ok(()), |folder| {
+        output_file::prepare_folder(folder, &[CHART], arguments.force)
+    })
 }
 
 /// The text of the golden table.
@@ -357,6 +372,7 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
             "run it in a checkout",
         ));
     }
+    check_outputs(arguments)?;
     let table = arguments
         .check
         .then(|| golden_table(&golden::path()))

@@ -29,7 +29,7 @@ use programs::{Part, image_remedy};
 pub(super) struct Arguments {
     #[command(flatten)]
     pub(super) place: BoardArguments,
-    /// Compares only: writes nothing, and does not interrupt the running firmware.
+    /// Compares only, with the image for a probe and with that for the board's own loader: writes nothing, and does not interrupt the running firmware.
     #[arg(long)]
     verify: bool,
     /// Writes the image for the board's own boot loader into this folder, the root of a card.
@@ -150,6 +150,29 @@ impl BoardArguments {
         Ok(image.clone())
     }
 
+    /// Checks the image given, if one is, before the search for a probe.
+    pub(super) fn check_image_in_chip(&self) -> Result<()> {
+        let given = self.image.is_some().then(|| self.image()).transpose()?;
+        given.map_or(Ok(()), |image| {
+            load(&image, self.board(), Image::check_in_chip).map(|_| ())
+        })
+    }
+
+    /// Calls `read` with the image that the chip holds: the one given; else the board's, or the one for its loader, whichever is there. Returns that one.
+    pub(super) fn with_image_in_chip(
+        &self,
+        mut read: impl FnMut(Target) -> std::result::Result<(), ProbeError>,
+    ) -> Result<(PathBuf, Image)> {
+        let board = self.board();
+        let has_two = self.image.is_none() && board.loader.is_some();
+        let of_card = has_two.then_some(Part::LoaderImage(board));
+        in_chip(Part::BoardImage(board), of_card, |part| {
+            let path = self.image_of(part)?;
+            let image = load(&path, board, Image::check_in_chip)?;
+            Ok(read(self.target(&path)).map(|()| (path, image)))
+        })
+    }
+
     pub(super) fn target(&self, image: &Path) -> Target {
         let chip = self.board().chip;
         Target {
@@ -169,8 +192,11 @@ pub(super) fn program() -> Result<Program> {
     Ok(Program::find()?)
 }
 
+/// A check of an image for a board.
+type Check = fn(&Image, &Board) -> std::result::Result<(), String>;
+
 /// Reads an image, and makes sure that it is one for this board and fits its flash.
-pub(super) fn load(path: &Path, board: &'static Board) -> Result<Image> {
+fn load(path: &Path, board: &'static Board, check: Check) -> Result<Image> {
     let refused = |why: String| {
         Failure::input(
             format!("{}: {why}", path.display()),
@@ -178,8 +204,20 @@ pub(super) fn load(path: &Path, board: &'static Board) -> Result<Image> {
         )
     };
     let image = Image::load(path).map_err(refused)?;
-    image.check_for(board).map_err(refused)?;
+    check(&image, board).map_err(refused)?;
     Ok(image)
+}
+
+/// Calls `read` with an image, and where the chip holds another one, with the other.
+fn in_chip<T>(
+    image: Part,
+    other: Option<Part>,
+    mut read: impl FnMut(Part) -> Result<std::result::Result<T, ProbeError>>,
+) -> Result<T> {
+    match (read(image)?, other) {
+        (Err(ProbeError::Problem(Problem::Differs(_))), Some(other)) => Ok(read(other)??),
+        (outcome, _) => Ok(outcome?),
+    }
 }
 
 /// One progress bar per kind of work.
@@ -220,30 +258,35 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         return loader::command(arguments);
     }
     // First the checks that need no probe, then those that need no firmware.
-    if place.image.is_some() {
-        load(&place.image()?, board)?;
+    if arguments.verify {
+        place.check_image_in_chip()?;
+    } else if place.image.is_some() {
+        load(&place.image()?, board, Image::check_for)?;
     }
     let program = program()?;
     let found = place.find(&program)?;
-    let path = place.image()?;
-    let image = load(&path, board)?;
-    let target = place.target(&path);
-    let chip = target.chip.clone();
-    let request = if arguments.verify {
-        Request::Compare(target)
-    } else {
-        Request::Flash(target)
+    let mut begun = Instant::now();
+    let mut run = |request: &Request| {
+        begun = Instant::now();
+        let mut bars = Bars::new();
+        let outcome = program.run(request, None, |event| {
+            if let Event::Progress { work, done, total } = event {
+                bars.show(*work, *done, *total);
+            }
+        });
+        bars.end();
+        outcome
     };
-    let begun = Instant::now();
-    let mut bars = Bars::new();
-    let ran = program.run(&request, None, |event| {
-        if let Event::Progress { work, done, total } = event {
-            bars.show(*work, *done, *total);
-        }
-    });
-    bars.end();
-    ran?;
+    let (path, image) = if arguments.verify {
+        place.with_image_in_chip(|target| run(&Request::Compare(target)))?
+    } else {
+        let path = place.image()?;
+        let image = load(&path, board, Image::check_for)?;
+        run(&Request::Flash(place.target(&path)))?;
+        (path, image)
+    };
     let seconds = begun.elapsed().as_secs_f64();
+    let chip = place.target(&path).chip;
     if arguments.json {
         say!(
             "{}",
@@ -276,4 +319,41 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         say!("  next:  cargo sim log --board {}", board.id);
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use boards::SKR_PRO;
+
+    /// The image for a probe is compared first. The card's is tried, and built, where flash differs from that alone.
+    #[test]
+    fn the_cards_image_is_tried_where_the_chip_holds_no_other() {
+        type Outcome = std::result::Result<u8, ProbeError>;
+        let (of_probe, of_card) = (Part::BoardImage(&SKR_PRO), Part::LoaderImage(&SKR_PRO));
+        let differs = |address| Err(ProbeError::Problem(Problem::Differs(address)));
+        let gone = || Err(ProbeError::Problem(Problem::Gone("unplugged".to_owned())));
+        let tried = |probe: Outcome, card: Outcome| {
+            let (mut probe, mut card) = (Some(probe), Some(card));
+            let outcome = in_chip(of_probe, Some(of_card), |image| {
+                let outcome = match image {
+                    Part::LoaderImage(_) => card.take(),
+                    _ => probe.take(),
+                };
+                Ok(outcome.expect("each image is tried once"))
+            });
+            let said = outcome.map_err(|failure| match failure {
+                Failure::Failed(Some(said)) => said,
+                other => panic!("{other:?}"),
+            });
+            (said, card.is_none())
+        };
+        assert_eq!(tried(Ok(1), Ok(2)), (Ok(1), false));
+        assert_eq!(tried(differs(0x0800_0000), Ok(2)), (Ok(2), true));
+        let (said, has_tried_the_card) = tried(gone(), Ok(2));
+        assert!(said.unwrap_err().contains("unplugged") && !has_tried_the_card);
+        let (said, _) = tried(differs(0x0800_0000), differs(0x0800_9000));
+        let said = said.unwrap_err();
+        assert!(said.contains("0x08009000") && said.contains("--sd DIR"), "{said}");
+    }
 }

@@ -5,15 +5,15 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::flash::{Bars, BoardArguments, load, program};
+use super::flash::{Bars, BoardArguments, program};
 use super::out::{complain, say};
 use super::{Failure, Result};
-use crate::probe::{Event, Line, Program, Request};
+use crate::probe::{Event, Line, ProbeError, Program, Request};
 
 /// Follows a board's log by a debug probe until Ctrl-C. The board is not reset, and never blocks on the log.
 ///
 /// Each line has the time since the board's start (s), the level and the message. The flash of the chip is compared with the image first:
-/// the log can be decoded only with the image that writes it.
+/// the log can be decoded only with the image that writes it. Where a board has a loader of its own, that is the image for a probe or the one for a card.
 ///
 /// Example: cargo sim log --board skr-pro
 /// Example: cargo sim log --board stm32f405 --json
@@ -32,24 +32,33 @@ pub(super) struct Arguments {
 
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let place = &arguments.place;
-    let (program, request, recorded) = match &arguments.from {
-        Some(from) => decode(place, from)?,
-        None => follow(place)?,
-    };
+    match &arguments.from {
+        Some(from) => decode(place, from, arguments.json),
+        None => follow(place, arguments.json),
+    }
+}
+
+/// Prints the log until it ends.
+fn read(
+    program: &Program,
+    request: &Request,
+    recorded: Option<File>,
+    as_json: bool,
+) -> std::result::Result<(), ProbeError> {
     let mut bars = Bars::new();
-    let outcome = program.run(&request, recorded, |event| match event {
+    let outcome = program.run(request, recorded, |event| match event {
         Event::Progress { work, done, total } => bars.show(*work, *done, *total),
         Event::Following => bars.end(),
-        Event::Line(line) => print(line, arguments.json),
+        Event::Line(line) => print(line, as_json),
         Event::Lost => complain!("warning: some of the log was lost"),
         Event::Probe { .. } | Event::Done | Event::Failed(_) => {}
     });
     bars.end();
-    Ok(outcome?)
+    outcome
 }
 
-/// The request for a recorded log. Every image is accepted, that of QEMU too.
-fn decode(place: &BoardArguments, from: &PathBuf) -> Result<(Program, Request, Option<File>)> {
+/// Decodes a recorded log. Every image is accepted, that of QEMU too.
+fn decode(place: &BoardArguments, from: &PathBuf, as_json: bool) -> Result<()> {
     let image = place.image()?;
     let recorded = File::open(from).map_err(|error| {
         Failure::input(
@@ -57,19 +66,21 @@ fn decode(place: &BoardArguments, from: &PathBuf) -> Result<(Program, Request, O
             "name a file of recorded defmt frames",
         )
     })?;
-    Ok((program()?, Request::Decode { image }, Some(recorded)))
+    Ok(read(
+        &program()?,
+        &Request::Decode { image },
+        Some(recorded),
+        as_json,
+    )?)
 }
 
-/// The request for the log of a board.
-fn follow(place: &BoardArguments) -> Result<(Program, Request, Option<File>)> {
-    if place.image.is_some() {
-        load(&place.image()?, place.board())?;
-    }
+/// Follows the log of a board.
+fn follow(place: &BoardArguments, as_json: bool) -> Result<()> {
+    place.check_image_in_chip()?;
     let program = program()?;
     place.find(&program)?;
-    let image = place.image()?;
-    load(&image, place.board())?;
-    Ok((program, Request::Log(place.target(&image)), None))
+    place.with_image_in_chip(|target| read(&program, &Request::Log(target), None, as_json))?;
+    Ok(())
 }
 
 fn print(line: &Line, as_json: bool) {

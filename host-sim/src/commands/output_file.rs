@@ -236,6 +236,15 @@ pub(super) fn check_folder(directory: &Path, names: &[&str], force: bool) -> Res
     }
 }
 
+/// The same before work of minutes: creates the folder, so that one that cannot be created is reported at once.
+///
+/// # Errors
+/// As [`check`], or the folder cannot be created.
+pub(super) fn prepare_folder(directory: &Path, names: &[&str], force: bool) -> Result<()> {
+    check_folder(directory, names, force)?;
+    std::fs::create_dir_all(directory).map_err(|error| cannot_write(directory, &error))
+}
+
 /// Makes files in a folder, which is created if missing: `make` writes them into another one.
 ///
 /// # Errors

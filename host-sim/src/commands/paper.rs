@@ -7,7 +7,7 @@ use clap::Args;
 use serde_json::{Value, json};
 
 use super::out::say;
-use super::{Result, cannot_write, progress};
+use super::{Result, output_file, progress};
 use study::paper::{Comparison, Item, Row, STEPS, SpacingTable, study};
 use study::report as page;
 use verify::speeds::SpeedRange;
@@ -21,6 +21,9 @@ pub(super) struct Arguments {
     /// Writes a page with the figures, and their data as JSON, into this folder.
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
+    /// Overwrites existing files of --report.
+    #[arg(long)]
+    force: bool,
     /// Prints JSON instead of tables.
     #[arg(long)]
     pub(super) json: bool,
@@ -220,8 +223,8 @@ fn print_spacing(table: &SpacingTable) {
 
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
     if let Some(folder) = &arguments.report {
-        // Created before the work, so that an invalid path fails at once.
-        std::fs::create_dir_all(folder).map_err(|error| cannot_write(folder, &error))?;
+        // Before the work, which takes minutes.
+        output_file::prepare_folder(folder, &page::FILES, arguments.force)?;
     }
     let bar = progress(STEPS, "reproducing");
     let study = study(&|| bar.inc(1))?;
@@ -229,11 +232,11 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let mut items = study.items.clone();
     items.extend(compared(&study.comparisons));
     items.extend(spaced(&study.spacings));
-    let written = arguments
-        .report
-        .as_ref()
-        .map(|folder| page::write(folder, &study).map_err(|error| cannot_write(folder, &error)))
-        .transpose()?;
+    if let Some(folder) = &arguments.report {
+        output_file::write_folder(folder, &page::FILES, arguments.force, |made| {
+            page::write(made, &study)
+        })?;
+    }
     if arguments.json {
         say!("{}", json(&items));
         return Ok(());
@@ -249,8 +252,8 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         "\nPasses of constant scallop height beside straight ones; crests by the swept ball, over the limit"
     );
     study.spacings.iter().for_each(print_spacing);
-    if let Some(page) = written {
-        say!("\nreport: {}", page.display());
+    if let Some(folder) = &arguments.report {
+        say!("\nreport: {}", folder.join(page::PAGE).display());
     }
     Ok(())
 }

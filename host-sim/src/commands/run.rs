@@ -22,7 +22,7 @@ use super::{Failure, Result, error_json, output_file, progress, read_profile, sc
 use approach::Kind;
 use compare::{by_digest, by_sample};
 pub(super) use connect::open_port;
-use connect::{Connected, connect, models_failure};
+use connect::{Connected, connect, models_failure, with_trouble};
 use inspect::FaultAt;
 use inspect::comparison::{BoardRun, Reference};
 use job::units::S_PER_MIN;
@@ -242,8 +242,11 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let (mut values, mut end) = run_all(&jobs, &stops, |path, stop| {
         run_job(arguments, (path, stop), several, &mut bench)
     });
-    if let (Ok(()), Some((peer, _))) = (&end, &mut bench.connected) {
-        end = passed_unless(models_failure(peer, arguments.json));
+    if let Some((peer, _)) = &mut bench.connected {
+        end = match end {
+            Ok(()) => passed_unless(models_failure(peer, arguments.json)),
+            Err(failure) => Err(with_trouble(failure, peer)),
+        };
     }
     if several {
         print_all(arguments, &jobs, &values, end.is_ok());
@@ -505,19 +508,17 @@ fn order_spindle(job: &Job, profile: Option<&MachineProfile>, session: &mut Sess
 
 /// The session with the board: begun with the first job. A simulated board takes the profile.
 fn session_of<'b>(arguments: &Arguments, bench: &'b mut Bench) -> Result<&'b mut Session> {
-    let connected = match (bench.connected.take(), &bench.profile) {
-        (Some(connected), _) => connected,
-        (None, profile) => {
-            let mut connected = connect(arguments)?;
-            if let Some(profile) = profile {
+    match &mut bench.connected {
+        Some((_, session)) => Ok(session),
+        empty => {
+            let (_, session) = empty.insert(connect(arguments)?);
+            if let Some(profile) = &bench.profile {
                 let profile = Some(profile::for_board(profile));
-                connected.1.command(&Request::SetProfile(profile))?;
+                session.command(&Request::SetProfile(profile))?;
             }
-            connected
+            Ok(session)
         }
-    };
-    let (_, session) = bench.connected.insert(connected);
-    Ok(session)
+    }
 }
 
 /// What the line did to the run, and the result of the comparison.

@@ -107,6 +107,20 @@ impl Image {
         self.check_at(board, FLASH_BEGIN)
     }
 
+    /// The same for an image that the board may hold already: it starts at flash's begin, or behind the board's loader.
+    ///
+    /// # Errors
+    /// Those of [`Image::check_for`].
+    pub fn check_in_chip(&self, board: &Board) -> Result<(), String> {
+        let behind_loader = || {
+            board
+                .loader
+                .map(|loader| self.check_at(board, loader.image_begin))
+        };
+        self.check_for(board)
+            .or_else(|why| behind_loader().unwrap_or(Err(why)))
+    }
+
     /// The same for an image that starts at `begin`, behind a loader.
     ///
     /// # Errors

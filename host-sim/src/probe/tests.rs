@@ -136,6 +136,38 @@ fn an_image_has_to_be_the_boards_and_start() {
     }
 }
 
+/// A board that a card has written has its loader at flash's begin, and the image behind it.
+#[test]
+fn the_chip_may_hold_an_image_behind_the_boards_loader() {
+    let in_chip = |address: u32, start: u32, board: &boards::Board, name: &str| {
+        let mut data = START;
+        data[4..8].copy_from_slice(&(start | 1).to_le_bytes());
+        let mut made = image(&[(LOAD, address, address, &data)]).unwrap();
+        made.board = Some(name.to_owned());
+        made.check_in_chip(board)
+    };
+    let skr_pro = |address, start| in_chip(address, start, &boards::SKR_PRO, "skr-pro");
+    assert_eq!(skr_pro(0x0800_0000, 0x0800_0008), Ok(()));
+    assert_eq!(skr_pro(0x0800_8000, 0x0800_8008), Ok(()));
+    for (outcome, says) in [
+        (skr_pro(0x0800_4000, 0x0800_4008), "no vector table at 0x08008000"),
+        // It would start the loader.
+        (skr_pro(0x0800_8000, 0x0800_0008), "start at 0x08000009"),
+        (
+            in_chip(0x0800_8000, 0x0800_8008, &boards::SKR_PRO, "stm32f405"),
+            "for the board stm32f405",
+        ),
+        // A board without a loader.
+        (
+            in_chip(0x0800_8000, 0x0800_8008, &boards::STM32F405, "stm32f405"),
+            "is it for a loader",
+        ),
+    ] {
+        let why = outcome.unwrap_err();
+        assert!(why.contains(says), "{says}: {why}");
+    }
+}
+
 fn problems() -> Vec<Problem> {
     let text = || "text".to_owned();
     vec![

@@ -64,7 +64,8 @@ pub fn remedy(problem: &Problem) -> &'static str {
             "try again; remove the write protection of a protected chip first (STM32CubeProgrammer, option bytes)"
         }
         Problem::Differs(_) => {
-            "write it with `cargo sim flash`, or give the image that is in the chip with --image"
+            "give the image that is in the chip with --image, or write this one as the board was written before: by a card (`cargo sim flash --sd \
+             DIR`) where its own loader did it, which a probe would replace, else by the probe (`cargo sim flash`)"
         }
         Problem::BadImage(_) => "name an image of the firmware, or leave --image out",
         Problem::NoLog(_) => {

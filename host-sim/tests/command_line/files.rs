@@ -57,6 +57,8 @@ fn outputs_are_not_overwritten() {
     std::fs::write(folder.path().join("there"), "there").unwrap();
     std::fs::create_dir(folder.path().join("page")).unwrap();
     std::fs::write(folder.path().join("page/index.html"), "mine").unwrap();
+    std::fs::create_dir(folder.path().join("charts")).unwrap();
+    std::fs::write(folder.path().join("charts/budget.svg"), "mine").unwrap();
     let cad = Path::new(env!("CARGO_MANIFEST_DIR")).join("../jobs/cad/mouse.step");
     std::fs::copy(cad, folder.path().join("mouse.step")).unwrap();
     std::fs::write(
@@ -94,6 +96,16 @@ fn outputs_are_not_overwritten() {
             "is what the command reads",
         ),
         ("new -o there", "exists already"),
+        // Commands of minutes; the firmware is not built before either.
+        ("paper --report page", "exists already"),
+        ("paper --report there --force", "that is a file"),
+        ("budget --report charts", "exists already"),
+        ("budget --report /proc/none", "create the folder first"),
+        ("budget --search 1 --out there", "exists already"),
+        (
+            "budget --search 1 --out none/there --force",
+            "create the folder first",
+        ),
     ] {
         let begun = std::time::Instant::now();
         let output = run(folder.path(), arguments);
@@ -108,6 +120,10 @@ fn outputs_are_not_overwritten() {
     assert_eq!(std::fs::read(folder.path().join("there")).unwrap(), b"there");
     assert_eq!(
         std::fs::read(folder.path().join("page/index.html")).unwrap(),
+        b"mine"
+    );
+    assert_eq!(
+        std::fs::read(folder.path().join("charts/budget.svg")).unwrap(),
         b"mine"
     );
     assert_eq!(names(folder.path()), before);

@@ -117,7 +117,7 @@ pub enum Spacing {
     /// changes from pass to pass, and several times at the ends of skew passes.
     FirstOrder = 1,
     /// Passes of constant scallop height ([`crate::Interpolator::plan`] makes each from the one before): curves `side = g(path)`, the first on the surface's first side
-    /// boundary. The limit holds as with [`Self::Exact`].
+    /// boundary. The limit holds as with [`Self::Exact`]. The store holds their stations besides the job's words: [`crate::front_words`].
     Constant = 2,
     /// As [`Self::Constant`], from the middle of the side parameter to its end, then from the middle to its start.
     ConstantFromMiddle = 3,
@@ -211,9 +211,9 @@ pub struct Header {
     pub spacing: Spacing,
     /// Side of the surface that the tool is on.
     pub tool_side: ToolSide,
-    /// Spans along the path parameter, 1 to [`SPANS_MAX`] (1 for a revolved surface).
+    /// Spans along the path parameter, 1 to [`SPANS_MAX`] (1 for a revolved surface); at most 1023 with a region, 256 with axis limits, 128 with passes of constant scallop height.
     pub path_spans: u16,
-    /// Spans along the side parameter, 1 to [`SPANS_MAX`] (1 for a revolved surface).
+    /// Spans along the side parameter, 1 to [`SPANS_MAX`] (1 for a revolved surface); at most 1023 with a region.
     pub side_spans: u16,
     /// Ball radius r, mm, above 0 and at most 1000.
     pub ball_radius_mm: f32,

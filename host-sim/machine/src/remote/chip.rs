@@ -11,7 +11,7 @@ use serde::Deserialize;
 
 use super::guard::GuardedFolder;
 use super::{RemoteError, Stream, port};
-use programs::Part;
+use programs::{Part, Unavailable};
 
 /// Time in which the program has to open its line.
 const START_TIMEOUT: Duration = Duration::from_secs(60);
@@ -19,9 +19,9 @@ const START_TIMEOUT: Duration = Duration::from_secs(60);
 /// Why the chip does not run.
 #[derive(Debug, thiserror::Error)]
 pub enum ChipError {
-    /// The image or the program could not be built.
-    #[error("{0} could not be built: {1}")]
-    Build(&'static str, String),
+    /// The image or the program is not there, and cannot be built.
+    #[error("{0} is not available: {1}")]
+    Unavailable(&'static str, Unavailable),
     /// It did not start, or ended.
     #[error("the program that executes the image did not start: {0}")]
     Start(String),
@@ -52,8 +52,7 @@ pub struct Chip {
 /// # Errors
 /// Cargo is missing or fails; its own words are passed on.
 pub fn image(board: &'static Board) -> Result<PathBuf, ChipError> {
-    programs::find(Part::BoardImage(board))
-        .map_err(|error| ChipError::Build("the firmware", error.to_string()))
+    programs::find(Part::BoardImage(board)).map_err(|error| ChipError::Unavailable("the firmware", error))
 }
 
 /// Builds the program that executes images.
@@ -62,7 +61,7 @@ pub fn image(board: &'static Board) -> Result<PathBuf, ChipError> {
 /// Likewise.
 pub fn program() -> Result<PathBuf, ChipError> {
     let name = "the program that executes images (host-sim/chip)";
-    programs::find(Part::ChipEmulator).map_err(|error| ChipError::Build(name, error.to_string()))
+    programs::find(Part::ChipEmulator).map_err(|error| ChipError::Unavailable(name, error))
 }
 
 impl Chip {
@@ -95,13 +94,8 @@ impl Chip {
         let deadline = Instant::now() + START_TIMEOUT;
         while !line.exists() {
             if self.child.try_wait().ok().flatten().is_some() || Instant::now() > deadline {
-                let mut words = String::new();
                 let _ = self.child.kill();
-                if let Some(mut stderr) = self.child.stderr.take() {
-                    // What cannot be read is not worth an error of its own.
-                    let _ = stderr.read_to_string(&mut words);
-                }
-                return Err(ChipError::Start(words.trim().to_owned()));
+                return Err(ChipError::Start(self.stderr()));
             }
             std::thread::sleep(Duration::from_millis(5));
         }
@@ -110,6 +104,25 @@ impl Chip {
             RemoteError::Line(cause) => ChipError::Start(cause.to_string()),
             other => ChipError::Start(other.to_string()),
         })
+    }
+
+    /// What it has written to its standard error, once it has ended.
+    fn stderr(&mut self) -> String {
+        let mut words = String::new();
+        if let Some(mut stderr) = self.child.stderr.take() {
+            // What cannot be read is not worth an error of its own.
+            let _ = stderr.read_to_string(&mut words);
+        }
+        words.trim().to_owned()
+    }
+
+    /// Ends it, and returns why it may have left the line: the models' first complaint, or its own error.
+    #[must_use]
+    pub fn trouble(&mut self) -> Option<String> {
+        let first = self.end().and_then(|said| said.complaints.into_iter().next());
+        first
+            .map(|complaint| format!("the models of the chip complain: {complaint}"))
+            .or_else(|| Some(self.stderr()).filter(|words| !words.is_empty()))
     }
 
     /// Ends it, and asks the models what they have to say; nothing where they did not get to it.
@@ -128,5 +141,45 @@ impl Drop for Chip {
         // Either it is gone already, or it goes now.
         let _ = self.child.kill();
         let _ = self.child.wait();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A shell script in the program's place.
+    fn chip(script: &str) -> Chip {
+        let folder = GuardedFolder::new().unwrap();
+        let child = Command::new("sh")
+            .args(["-c", script, "chip"])
+            .arg(folder.path())
+            .stdin(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        Chip { child, folder }
+    }
+
+    #[test]
+    fn the_first_complaint_or_its_own_error_is_its_trouble() {
+        let report = |complaints: &str| {
+            format!(
+                "printf '%s' '{{\"complaints\": [{complaints}], \"bytes_lost\": 0, \"byte_wait_max_cycles\": 9, \"resets\": 0}}' > \"$1/report\""
+            )
+        };
+        let of = |script: &str| chip(script).trouble();
+        let missing = of("echo 'error: libunicorn.so.2 is not installed' >&2; exit 2");
+        assert_eq!(
+            missing.as_deref(),
+            Some("error: libunicorn.so.2 is not installed")
+        );
+        let complained = of(&report(r#""TIM2 without its clock", "another""#));
+        assert_eq!(
+            complained.as_deref(),
+            Some("the models of the chip complain: TIM2 without its clock")
+        );
+        // It ends with its input, and has nothing to say.
+        assert_eq!(of(&format!("read -r _; {}", report(""))), None);
     }
 }

@@ -6,7 +6,7 @@ use cycle_plugin::plan::Stage;
 use serde_json::{Value, json};
 
 use super::super::out::{say, say_part};
-use super::super::{Failure, Result, cannot_write, progress};
+use super::super::{Failure, Result, output_file, progress};
 use super::Arguments;
 use cycles::PERIOD_CYCLES;
 use cycles::figures::{Model, tick_cycles};
@@ -108,6 +108,7 @@ pub(super) fn command(setup: &MeasurementSetup, jobs: u32, arguments: &Arguments
         constant,
         region,
         ref out,
+        force,
         json: as_json,
         ..
     } = *arguments;
@@ -130,11 +131,8 @@ pub(super) fn command(setup: &MeasurementSetup, jobs: u32, arguments: &Arguments
         options(class),
         describe(&found.worst)
     );
-    std::fs::write(
-        out,
-        text::text(&found.job, &programs::with_command_name(&comment)),
-    )
-    .map_err(|error| cannot_write(out, &error))?;
+    let text = text::text(&found.job, &programs::with_command_name(&comment));
+    output_file::write(out, text.as_bytes(), force)?;
     if as_json {
         let report = json!({
             "seed": seed,

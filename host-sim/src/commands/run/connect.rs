@@ -53,14 +53,32 @@ fn connect_chip(name: &str, fast: bool) -> Result<Connected> {
     bar.finish_and_clear();
     let (program, image) = built?;
     let (chip, stream) = Chip::start(&program, &image, fast)?;
-    Ok((Peer::Chip(chip), Session::open(stream, session_number())?))
+    let mut peer = Peer::Chip(chip);
+    let session =
+        Session::open(stream, session_number()).map_err(|error| with_trouble(error.into(), &mut peer))?;
+    Ok((peer, session))
+}
+
+/// A failure at the line, with what the chip emulator has to say about it: the line breaks where the emulator ends. Ends it.
+pub(super) fn with_trouble(failure: Failure, peer: &mut Peer) -> Failure {
+    let (Failure::Failed(said), Peer::Chip(chip)) = (&failure, peer) else {
+        return failure;
+    };
+    match (said, chip.trouble()) {
+        (_, None) => failure,
+        (None, trouble) => Failure::Failed(trouble),
+        (Some(said), Some(trouble)) => Failure::Failed(Some(format!("{said}\n  chip emulator: {trouble}"))),
+    }
 }
 
 /// Complaints of the models of a chip, and lost bytes; ends the emulator.
 pub(super) fn models_failure(peer: &mut Peer, as_json: bool) -> Option<String> {
     let Peer::Chip(chip) = peer else { return None };
     let Some(said) = chip.end() else {
-        return Some("the chip emulator ended without a report".to_owned());
+        let why = chip
+            .trouble()
+            .map_or_else(String::new, |trouble| format!(": {trouble}"));
+        return Some(format!("the chip emulator ended without a report{why}"));
     };
     if !as_json {
         say!(

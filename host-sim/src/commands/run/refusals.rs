@@ -70,12 +70,13 @@ impl From<QemuError> for Failure {
 
 impl From<ChipError> for Failure {
     fn from(error: ChipError) -> Self {
-        let remedy = match error {
-            ChipError::Build(..) => {
-                "\n  help: run it in a checkout of the sources, where the image can be built, or run the job with `simulate`"
+        let remedy = match &error {
+            ChipError::Unavailable(_, cause) if programs::checkout().is_some() => cause.remedy(),
+            ChipError::Unavailable(..) => {
+                "run it in a checkout of the sources, where the image can be built, or run the job with `simulate`"
             }
-            ChipError::Start(_) => "",
+            ChipError::Start(_) => return Self::Failed(Some(error.to_string())),
         };
-        Self::Failed(Some(format!("{error}{remedy}")))
+        Self::Failed(Some(format!("{error}\n  help: {remedy}")))
     }
 }

@@ -8,7 +8,7 @@ mod text;
 
 use std::fmt::Write;
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde_json::{Value, json};
 
@@ -16,6 +16,13 @@ use crate::paper::figures::SpeedTrack;
 use crate::paper::{Figures, Study};
 use ::report::number::fixed;
 use ::report::page::STYLE;
+
+/// The page.
+pub const PAGE: &str = "index.html";
+/// The files that [`write`] makes.
+pub const FILES: [&str; 2] = [DATA, PAGE];
+/// The figures' data.
+const DATA: &str = "figures.json";
 
 const PAPER_STYLE: &str = include_str!("paper.css");
 
@@ -51,15 +58,14 @@ fn shown(value: f64, decimals: usize) -> String {
     }
 }
 
-/// Writes `index.html` and `figures.json` into an existing folder, and returns the page's path.
+/// Writes the [`FILES`] into an existing folder.
 ///
 /// # Errors
 /// The files cannot be written.
-pub fn write(folder: &Path, study: &Study) -> io::Result<PathBuf> {
-    std::fs::write(folder.join("figures.json"), data(&study.figures).to_string())?;
-    let path = folder.join("index.html");
-    std::fs::write(&path, programs::with_command_name(&page(study)?).as_ref())?;
-    Ok(path)
+pub fn write(folder: &Path, study: &Study) -> io::Result<()> {
+    std::fs::write(folder.join(DATA), data(&study.figures).to_string())?;
+    let page = page(study)?;
+    std::fs::write(folder.join(PAGE), programs::with_command_name(&page).as_ref())
 }
 
 /// The whole page.
