@@ -44,7 +44,7 @@ const SPACING_PARTS: f32 = 128.0;
 const FIRST_NOISE: f32 = 2e-6;
 const SECOND_NOISE: f32 = 12e-6;
 const THIRD_NOISE: f32 = 60e-6;
-/// The same by differences of first derivatives in single precision: of the first, of the second times the length, of the third times its square.
+/// The same by differences of first derivatives in single precision, of which none is above 1: of the first, of the second times the length, of the third times its square.
 const DIRECTION_NOISE: [f32; 3] = [1e-6, 1.6e-6, 4e-6];
 
 /// Least length of a cell, mm: a shorter one has differences of rounded positions.
@@ -302,7 +302,9 @@ impl Window {
         let inverse = 1.0 / self.spacing_mm().at_least(1e-3);
         let [square, cube] = [inverse * inverse, inverse * inverse * inverse];
         if self.has_directions() {
-            let [first, second, third] = DIRECTION_NOISE;
+            let components = self.directions.iter().flatten().flatten();
+            let size = components.fold(1.0_f32, |most, part| most.at_least(part.abs()));
+            let [first, second, third] = DIRECTION_NOISE.map(|noise| noise * size);
             [first, second * inverse, third * square]
         } else {
             [FIRST_NOISE * inverse, SECOND_NOISE * square, THIRD_NOISE * cube]

@@ -51,7 +51,7 @@ use crate::math::vec3::Vec3;
 pub const SINE_MIN: f32 = 1e-3;
 
 /// Curvature of the parametrisation, times the ball's radius, above which the derivative of the ball's centre is not computed: it is that of a place near a pole.
-const NEAR_POLE: f32 = 16.0;
+const NEAR_POLE: f32 = 1024.0;
 
 /// Square of the tangent of the angle whose sine is [`SINE_MIN`].
 const TANGENT_MIN_SQUARED: f32 = SINE_MIN * SINE_MIN / (1.0 - SINE_MIN * SINE_MIN);
@@ -199,22 +199,18 @@ impl Derivatives {
         let path = offset.dot(self.path2 + self.mixed * slope);
         let side = offset.dot(self.mixed + self.side2 * slope);
         let curvature = (path + side * slope) * (inverse * inverse);
-        // By that of the two derivatives which tells it better.
-        let mut twist = 0.0;
-        let mut size = f32::INFINITY;
-        for (by, form, change) in [
-            (self.path, path, self.path2 + self.mixed * slope),
-            (self.side, side, self.mixed + self.side2 * slope),
-        ] {
-            let per_beside = inverse / by.dot(across);
-            let of_change = change.dot(change) * (per_beside * per_beside);
-            if of_change < size {
-                size = of_change;
-                twist = (form - by.dot(tangent) * curvature) * per_beside;
-            }
-        }
+        // By the derivative that is more across the path.
+        let sine_squared = |by: Vec3| by.dot(across) * by.dot(across) / by.dot(by);
+        let (by, form, change) = if sine_squared(self.path) > sine_squared(self.side) {
+            (self.path, path, self.path2 + self.mixed * slope)
+        } else {
+            (self.side, side, self.mixed + self.side2 * slope)
+        };
+        let per_beside = inverse / by.dot(across);
+        let twist = (form - by.dot(tangent) * curvature) * per_beside;
         // The offset is known to a share of its length.
-        let is_known = size * offset.dot(offset) < NEAR_POLE * NEAR_POLE;
+        let size = change.dot(change) * offset.dot(offset) * (per_beside * per_beside);
+        let is_known = size < NEAR_POLE * NEAR_POLE;
         is_known.then(|| along * (1.0 - curvature) - across * twist)
     }
 }
