@@ -142,3 +142,32 @@ fn a_page_shows_the_part() {
     let again = run(folder.path(), "import blade.step --list --page blade.html");
     assert_eq!(again.status.code(), Some(2), "{}", err(&again));
 }
+
+/// The command of the page machines a trimmed face as it is; the whole rectangle only where the boundary is not known, and then the page tells.
+#[test]
+fn the_page_leaves_trimmed_faces_trimmed() {
+    let folder = tempfile::tempdir().unwrap();
+    let cad = Path::new(env!("CARGO_MANIFEST_DIR")).join("../jobs/cad/blade.step");
+    let text = std::fs::read_to_string(cad).unwrap();
+    let lost = text.replace("#618 = CIRCLE(", "#618 = CLOTHOID(");
+    assert_ne!(lost, text);
+    std::fs::write(folder.path().join("part.step"), lost).unwrap();
+    let listed = json(folder.path(), "import part.step --list --page part.html --json");
+    let page = std::fs::read_to_string(folder.path().join("part.html")).unwrap();
+    let (_, data) = page.split_once("id=\"data\">").unwrap();
+    let data: Value = serde_json::from_str(data.split_once("</script>").unwrap().0).unwrap();
+    let mut trimmed = 0;
+    for (face, listed) in data["faces"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .zip(listed["faces"].as_array().unwrap())
+    {
+        let unknown = listed["boundary_known"] == false;
+        trimmed += usize::from(!unknown && listed["trimmed"] == true);
+        let [command, state] = ["command", "state"].map(|key| face[key].as_str().unwrap());
+        assert_eq!(command.contains("--untrimmed"), unknown, "{face}");
+        assert_eq!(state.contains("the whole rectangle"), unknown, "{face}");
+    }
+    assert!(trimmed > 0);
+}
