@@ -171,3 +171,21 @@ fn the_page_leaves_trimmed_faces_trimmed() {
     }
     assert!(trimmed > 0);
 }
+
+/// A face that bounds no solid is machined from above, whichever way its normal points: `--only up` lists it.
+#[test]
+fn a_face_that_is_machined_from_above_is_listed_as_up() {
+    let folder = tempfile::tempdir().unwrap();
+    let sheet = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/hostile_cad/sound.step");
+    let sheet = std::fs::read_to_string(sheet).unwrap();
+    let turned = sheet.replace("(#23),#30,.T.)", "(#23),#30,.F.)");
+    assert_ne!(turned, sheet);
+    for (name, text) in [("sheet", sheet), ("turned", turned)] {
+        std::fs::write(folder.path().join(format!("{name}.step")), text).unwrap();
+        let list = json(
+            folder.path(),
+            &format!("import {name}.step --list --only up --json"),
+        );
+        assert_eq!(list["faces"].as_array().unwrap().len(), 1, "{name}");
+    }
+}
