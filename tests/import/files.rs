@@ -227,7 +227,11 @@ fn rhino_polysurfaces_that_fall_apart_have_no_known_boundary() {
         (model.faces.len(), model.faces.iter().filter(unknown).count()),
         (9, 6)
     );
-    assert!(warns(&model, "Brep topology fallback"), "{:?}", model.warnings);
+    assert!(
+        warns(&model, "the edges of a polysurface were not read"),
+        "{:?}",
+        model.warnings
+    );
 }
 
 /// An extrusion that is not read counts as a face that is not known.

@@ -7,7 +7,7 @@ use cadmpeg_core::decode::{DecodeDepth, DecodePolicy, ResourceLimits};
 use cadmpeg_ir::geometry::{ProceduralSurfaceDefinition as Made, SolvedSurfaceGeometry, SurfaceGeometry};
 use cadmpeg_ir::products::{OccurrenceParent, PrototypeReference};
 use cadmpeg_ir::report::Severity;
-use cadmpeg_ir::report::loss::LossNote;
+use cadmpeg_ir::report::loss::{LossNote, LossTaxonomy};
 use cadmpeg_ir::topology::{BodyKind, Color, Sense};
 use cadmpeg_ir::{Codec, CodecFormat, DecodeOptions, SourceFidelity, SourceGeometryRole};
 
@@ -197,11 +197,14 @@ pub(crate) fn decode(
         return Err(CadError::new(file, what, remedy));
     }
     let losses = &decoded.losses;
-    let told = losses.iter().filter(|loss| loss.severity >= Severity::Warning);
-    let told: Vec<String> = told
-        .filter_map(|loss| stated.told(loss, losses))
-        .map(|text| shortened(&text))
+    let mut told: Vec<&LossNote> = losses
+        .iter()
+        .filter(|loss| loss.severity >= Severity::Warning)
         .collect();
+    // Faces whose edges are lost come first.
+    told.sort_by_key(|loss| loss.code.taxonomy() != LossTaxonomy::TopologyNotTransferred);
+    let told = told.into_iter().filter_map(|loss| stated.told(loss, losses));
+    let told: Vec<String> = told.map(|text| shortened(&text)).collect();
     // Room for some of what the codec tells, however many surfaces are left out.
     model.warnings.truncate(WARNINGS_MAX - told.len().min(TOLD_LEAST));
     let room = WARNINGS_MAX - model.warnings.len();

@@ -179,9 +179,12 @@ fn lost_class(loss: &LossNote) -> Option<(&str, u32)> {
 /// What is told of a loss, if it is one of surfaces.
 pub(crate) fn told(loss: &LossNote, losses: &[LossNote]) -> Option<String> {
     let is_told = match loss.code.local_code() {
-        "topology.brep-fallback" | "curve.polycurve-join-gap" | "container.instance-definition-degraded" => {
-            true
+        "topology.brep-fallback" => {
+            let why = loss.message.strip_prefix("Brep topology fallback: ");
+            let why = why.unwrap_or(&loss.message);
+            return Some(format!("the edges of a polysurface were not read: {why}"));
         }
+        "curve.polycurve-join-gap" | "container.instance-definition-degraded" => true,
         // Their number is told with the objects that are lost; here is why.
         "object.decode-diagnostic" => {
             let (class, why) = loss.message.split_once(':')?;
