@@ -338,6 +338,48 @@ def write_3dm(path):
     return compound([mouse(), sphere])
 
 
+def write_3dm_objects(path):
+    """Documents of Rhino with other objects than polysurfaces, in mm: for tests of what is read, what is left out, and what is told."""
+    model = rhino3dm.File3dm()
+    model.Settings.ModelUnitSystem = rhino3dm.UnitSystem.Millimeters
+
+    def cylinder(x):
+        circle = rhino3dm.Circle(rhino3dm.Point3d(x, 0, 0), 5).ToNurbsCurve()
+        return rhino3dm.Extrusion.Create(circle, 5, True)
+
+    def named(name, visible=True):
+        attributes = rhino3dm.ObjectAttributes()
+        attributes.Name = name
+        attributes.Visible = visible
+        return attributes
+
+    pad = named("pad")
+    pad.ColorSource = rhino3dm.ObjectColorSource.ColorFromObject
+    pad.ObjectColor = (255, 128, 0, 255)
+    model.Objects.AddExtrusion(cylinder(0), pad)
+    corners = rhino3dm.BoundingBox(20, 0, 0, 30, 10, 10)
+    model.Objects.AddBrep(rhino3dm.Brep.CreateFromBox(rhino3dm.Box(corners)), named("block"))
+    model.Objects.AddExtrusion(cylinder(40), named("guard", visible=False))
+    mesh = rhino3dm.Mesh()
+    for x, y in ((60, 0), (70, 0), (60, 10)):
+        mesh.Vertices.Add(x, y, 0)
+    mesh.Faces.AddFace(0, 1, 2)
+    model.Objects.AddMesh(mesh, named("scan"))
+    # A block with a text dot, which the reader's library does not read: it leaves out the whole block.
+    dot = rhino3dm.TextDot("M6", rhino3dm.Point3d(0, 0, 0))
+    origin = rhino3dm.Point3d(0, 0, 0)
+    members = (cylinder(0), dot)
+    clip = model.InstanceDefinitions.Add("clip", "", "", "", origin, members, (named("clip"), named("text")))
+    place = rhino3dm.InstanceReference(model.InstanceDefinitions[clip].Id, rhino3dm.Transform.Translation(80, 0, 0))
+    model.Objects.AddInstanceObject(place, named("clip"))
+    model.Objects.AddTextDot("note", origin)
+    assert model.Write(str(path / "objects.3dm"), 7)
+    model = rhino3dm.File3dm()
+    model.Settings.ModelUnitSystem = rhino3dm.UnitSystem.Millimeters
+    model.Objects.AddMesh(mesh, named("scan"))
+    assert model.Write(str(path / "mesh.3dm"), 7)
+
+
 # Reference points
 
 
@@ -391,6 +433,7 @@ def main():
         "swept.step": write_step(CAD / "swept.step", swept(), "AP242DIS"),
         "swept.igs": write_iges(CAD / "swept.igs", swept()),
     }
+    write_3dm_objects(ROOT / "tests" / "import")
     lines = [
         "# Points of the faces in jobs/cad, evaluated by OpenCASCADE; made by scripts/make_cad.py.",
         "# file, face in the kernel's own order, point (mm), unit normal out of the solid or as the face is turned",

@@ -127,6 +127,33 @@ fn unknown_faces_are_no_pass() {
     );
 }
 
+/// A folder has the jobs of one import: those of an earlier one in another order go with `--force`, and nothing else does.
+#[test]
+fn jobs_of_an_earlier_import_do_not_stay() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let sheet = cad("../../tests/hostile_cad/sound.step");
+    std::fs::copy(sheet, folder.join("sheet.step")).unwrap();
+    let import = "import sheet.step --part --tool 3 --scallop-mm 1 -o out --json";
+    let [stale, mine] = ["out/007-face-2.toml", "out/my-face-2.toml"];
+    std::fs::create_dir(folder.join("out")).unwrap();
+    for name in [stale, mine] {
+        std::fs::write(folder.join(name), "of an earlier import").unwrap();
+    }
+    let output = run(folder, import);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(
+        said.contains("exists already") && said.contains("--force"),
+        "{said}"
+    );
+    assert!(folder.join(stale).is_file());
+    let (summary, code) = json(folder, &format!("{import} --force"));
+    assert_eq!(code, Some(0), "{summary}");
+    assert!(folder.join("out/001-face-1.toml").is_file());
+    assert!(!folder.join(stale).exists() && folder.join(mine).is_file());
+}
+
 /// A face that looks down is turned up; the file's +z reaches nothing of it.
 #[test]
 fn the_best_side_is_turned_up() {

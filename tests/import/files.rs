@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Instant;
 
-use cad::{Options, Surface, machinable, read};
+use cad::{Boundary, CadError, Model, Options, Surface, machinable, read};
 
 use super::{cad, workspace};
 
@@ -155,4 +155,118 @@ fn ten_megabytes() {
     );
     assert_eq!(model.faces.len(), copies);
     assert_eq!(made.patches, 64);
+}
+
+/// A document of Rhino with a coloured extrusion, a box, a hidden extrusion, a mesh, and a block with a text dot, which the reader's library does not read.
+/// `change` damages it.
+fn rhino_objects(change: impl FnOnce(&mut Vec<u8>)) -> Result<Model, CadError> {
+    let mut bytes = std::fs::read(workspace().join("tests/import/objects.3dm")).unwrap();
+    change(&mut bytes);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("objects.3dm");
+    std::fs::write(&path, bytes).unwrap();
+    read(&path)
+}
+
+/// The place of these bytes in a file.
+fn place(bytes: &[u8], of: &[u8]) -> usize {
+    bytes.windows(of.len()).position(|window| window == of).unwrap()
+}
+
+/// Identifiers of classes, as they are written.
+const BREP: [u8; 8] = [0xc5, 0xdb, 0xb5, 0x60, 0x60, 0xe6, 0xd3, 0x11];
+const EXTRUSION: [u8; 8] = [0x75, 0x31, 0xf5, 0x36, 0xb8, 0x72, 0x47, 0x4d];
+
+/// Whether one of the warnings has these words.
+fn warns(model: &Model, words: &str) -> bool {
+    model.warnings.iter().any(|warning| warning.contains(words))
+}
+
+/// Meshes and blocks that are not read are told, and count as faces that are not known; dots and points do not. Hidden objects are left out.
+#[test]
+fn rhino_objects_without_a_surface_count() {
+    let model = rhino_objects(|_| ()).unwrap();
+    assert_eq!(
+        (model.faces.len(), model.left_out),
+        (9, 2),
+        "{:?}",
+        model.warnings
+    );
+    assert!(
+        warns(&model, "nothing was read: 1 mesh, 1 block"),
+        "{:?}",
+        model.warnings
+    );
+    assert!(warns(&model, "block: instance retained"), "{:?}", model.warnings);
+    assert!(
+        warns(&model, "hidden objects, which are left out: 3"),
+        "{:?}",
+        model.warnings
+    );
+    // The sides of an extrusion are a surface on its own, its ends are a sheet: both have the name and the colour of the object.
+    let named = |name| {
+        let faces = model.faces.iter();
+        faces.filter(move |face| face.name.as_deref() == Some(name))
+    };
+    assert_eq!((named("pad").count(), named("block").count()), (3, 6));
+    assert!(named("pad").all(|face| face.colour == Some([255, 128, 0])));
+}
+
+/// The surfaces of a polysurface whose edges are lost end nobody knows where; they were taken for whole faces.
+#[test]
+fn rhino_polysurfaces_that_fall_apart_have_no_known_boundary() {
+    let model = rhino_objects(|bytes| {
+        // The surface of the first face.
+        let at = place(bytes, &BREP) + 11_851;
+        assert_eq!(bytes[at..at + 4], [0; 4]);
+        bytes[at] = 0x7f;
+    })
+    .unwrap();
+    let unknown = |face: &&cad::Face| matches!(face.boundary, Boundary::Unknown(_));
+    assert_eq!(
+        (model.faces.len(), model.faces.iter().filter(unknown).count()),
+        (9, 6)
+    );
+    assert!(
+        warns(&model, "the edges of a polysurface were not read"),
+        "{:?}",
+        model.warnings
+    );
+}
+
+/// An extrusion that is not read counts as a face that is not known.
+#[test]
+fn rhino_extrusions_that_are_not_read_count() {
+    let model = rhino_objects(|bytes| {
+        // The vector along its profile.
+        let at = place(bytes, &EXTRUSION) + 531;
+        bytes[at] ^= 0x7f;
+    })
+    .unwrap();
+    assert_eq!(
+        (model.faces.len(), model.left_out),
+        (6, 3),
+        "{:?}",
+        model.warnings
+    );
+}
+
+/// A document without a unit of length, and one of meshes alone, are refused for what they are.
+#[test]
+fn rhino_files_of_which_nothing_is_read_tell_why() {
+    let error = rhino_objects(|bytes| {
+        let at = place(bytes, &[0x31, 0x80, 0, 0x20]) + 16;
+        assert_eq!(bytes[at], 2);
+        bytes[at] = 0;
+    })
+    .unwrap_err();
+    assert!(error.what.contains("no unit of length"), "{error}");
+    assert!(
+        error.remedy.contains("set the document's units"),
+        "{}",
+        error.remedy
+    );
+    let error = read(&workspace().join("tests/import/mesh.3dm")).unwrap_err();
+    assert!(error.what.contains("it has 1 mesh"), "{error}");
+    assert!(error.remedy.contains("ToNURBS"), "{}", error.remedy);
 }

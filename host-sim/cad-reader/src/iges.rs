@@ -150,7 +150,7 @@ impl Reader for Iges {
         let entries = Entries::new(&Lines::new(&bytes));
         mark_parameter_curves(&mut bytes, &entries);
         let bytes = converted(&bytes, &entries).unwrap_or(bytes);
-        ir::decode(file, &cadmpeg_codec_iges::IgesCodec, bytes, &Text(entries))
+        ir::decode(file, &cadmpeg_codec_iges::IgesCodec, &bytes, &Text(entries))
     }
 }
 

@@ -7,9 +7,9 @@ use cadmpeg_core::decode::{DecodeDepth, DecodePolicy, ResourceLimits};
 use cadmpeg_ir::geometry::{ProceduralSurfaceDefinition as Made, SolvedSurfaceGeometry, SurfaceGeometry};
 use cadmpeg_ir::products::{OccurrenceParent, PrototypeReference};
 use cadmpeg_ir::report::Severity;
-use cadmpeg_ir::report::loss::LossNote;
-use cadmpeg_ir::topology::{BodyKind, Sense};
-use cadmpeg_ir::{Codec, DecodeOptions};
+use cadmpeg_ir::report::loss::{LossNote, LossTaxonomy};
+use cadmpeg_ir::topology::{BodyKind, Color, Sense};
+use cadmpeg_ir::{Codec, CodecFormat, DecodeOptions, SourceFidelity, SourceGeometryRole};
 
 use crate::ir_geometry::{SURFACE_DEPTH_MAX, placement, point, solved_surface, vector};
 use crate::ir_index::{Translation, entity};
@@ -37,6 +37,15 @@ const NOT_READ: &str = " is of a kind that is not read";
 const SAME_POINT: f64 = 1e-9;
 /// Largest number of warnings.
 const WARNINGS_MAX: usize = 12;
+/// Of these, losses that the codec tells.
+const TOLD_LEAST: usize = 4;
+
+/// What a codec made of a file.
+pub(crate) struct Decoded {
+    pub(crate) ir: CadIr,
+    pub(crate) losses: Vec<LossNote>,
+    pub(crate) source: SourceFidelity,
+}
 
 /// What the text of a file says, read apart from the codec: for the cross-check. Entities have their names in the file, such as `#12`.
 pub(crate) trait Stated {
@@ -64,6 +73,53 @@ pub(crate) trait Stated {
     fn owner(&self, _surface: &str) -> Option<String> {
         None
     }
+
+    /// The objects that have surfaces of which the codec read none.
+    fn lost(&self, _decoded: &Decoded) -> Lost {
+        Lost::default()
+    }
+
+    /// What is told of a loss, of those of the file: of one of surfaces, not of names, colours, or parameter curves.
+    fn told(&self, loss: &LossNote, _losses: &[LossNote]) -> Option<String> {
+        let text = loss.message.to_lowercase();
+        let lost = [
+            "not projected",
+            "invalid",
+            "omitted",
+            "not a surface",
+            "quarantined",
+            "unsupported",
+        ];
+        let on = [
+            "surface",
+            "geometry",
+            "face",
+            "instance #",
+            "record",
+            "parameter data",
+        ];
+        let is_lost =
+            lost.iter().any(|word| text.contains(word)) && on.iter().any(|word| text.contains(word));
+        is_lost.then(|| attributed(loss))
+    }
+
+    /// Whether objects that are hidden in the file are left out.
+    fn leaves_out_hidden(&self) -> bool {
+        false
+    }
+
+    /// Why nothing of the file is read, and what to do; `None` if that is not known.
+    fn why_empty(&self, _decoded: &Decoded) -> Option<(String, &'static str)> {
+        None
+    }
+}
+
+/// Objects of which no surface is read.
+#[derive(Default)]
+pub(crate) struct Lost {
+    pub(crate) count: usize,
+    /// Their kinds, each with its number, in words.
+    pub(crate) kinds: String,
 }
 
 /// Compares the points with what the text says of them, and refuses a unit that is in doubt.
@@ -105,7 +161,7 @@ fn agree(read: DVec3, said: DVec3) -> bool {
 pub(crate) fn decode(
     file: &str,
     codec: &dyn Codec,
-    bytes: Vec<u8>,
+    bytes: &[u8],
     stated: &dyn Stated,
 ) -> Result<Model, CadError> {
     let options = DecodeOptions {
@@ -123,45 +179,42 @@ pub(crate) fn decode(
             "export the part again, or in another format (STEP is read best)",
         )
     })?;
-    cross_check(file, decoded.ir(), stated)?;
-    let translation = Translation::new(decoded.ir());
+    let (ir, report, source) = decoded.into_parts();
+    let decoded = Decoded {
+        ir,
+        losses: report.losses,
+        source,
+    };
+    cross_check(file, &decoded.ir, stated)?;
+    let translation = Translation::new(&decoded.ir);
     let mut model = translation.model(file, stated)?;
     for warning in &mut model.warnings {
-        explain(
-            warning,
-            decoded.report().losses.iter().map(|loss| loss.message.as_str()),
-        );
+        explain(warning, decoded.losses.iter().map(|loss| loss.message.as_str()));
     }
-    let losses = decoded
-        .report()
-        .losses
+    if model.faces.is_empty()
+        && let Some((what, remedy)) = stated.why_empty(&decoded)
+    {
+        return Err(CadError::new(file, what, remedy));
+    }
+    let losses = &decoded.losses;
+    let mut told: Vec<&LossNote> = losses
         .iter()
-        .filter(|loss| loss.severity >= Severity::Warning);
-    let telling = losses.filter(|loss| {
-        let text = loss.message.to_lowercase();
-        // Losses of surfaces; not those of names, colours, or parameter curves.
-        let lost = [
-            "not projected",
-            "invalid",
-            "omitted",
-            "not a surface",
-            "quarantined",
-            "unsupported",
-        ];
-        let on = [
-            "surface",
-            "geometry",
-            "face",
-            "instance #",
-            "record",
-            "parameter data",
-        ];
-        lost.iter().any(|word| text.contains(word)) && on.iter().any(|word| text.contains(word))
-    });
-    let room = WARNINGS_MAX.saturating_sub(model.warnings.len());
-    model
-        .warnings
-        .extend(telling.take(room).map(|loss| shortened(&attributed(loss))));
+        .filter(|loss| loss.severity >= Severity::Warning)
+        .collect();
+    // Faces whose edges are lost come first.
+    told.sort_by_key(|loss| loss.code.taxonomy() != LossTaxonomy::TopologyNotTransferred);
+    let told = told.into_iter().filter_map(|loss| stated.told(loss, losses));
+    let told: Vec<String> = told.map(|text| shortened(&text)).collect();
+    // Room for some of what the codec tells, however many surfaces are left out.
+    model.warnings.truncate(WARNINGS_MAX - told.len().min(TOLD_LEAST));
+    let room = WARNINGS_MAX - model.warnings.len();
+    model.warnings.extend(told.into_iter().take(room));
+    let lost = stated.lost(&decoded);
+    if lost.count > 0 {
+        model.left_out += lost.count;
+        let what = format!("objects of the file of which nothing was read: {}", lost.kinds);
+        model.warnings.insert(0, what);
+    }
     let unread = translation.unread_faces(stated);
     if let Some(first) = unread.first() {
         let count = unread.len();
@@ -210,6 +263,27 @@ fn shortened(text: &str) -> String {
     }
     let start: String = text.chars().take(LENGTH).collect();
     format!("{start} ...")
+}
+
+/// The first name that is not blank.
+fn label<const N: usize>(names: [Option<&str>; N]) -> Option<String> {
+    let mut named = names.into_iter().flatten().map(str::trim);
+    named.find(|text| !text.is_empty()).map(shortened)
+}
+
+/// A colour as red, green, blue.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "rounded, 0 to 255"
+)]
+fn rgb(colour: Color) -> [u8; 3] {
+    [colour.r(), colour.g(), colour.b()].map(|share| (share * 255.0).round().clamp(0.0, 255.0) as u8)
+}
+
+/// The Brep of one of its surfaces in a 3DM file, by the surface's name.
+fn brep_of(surface: &str) -> Option<&str> {
+    surface.rsplit_once(".slot-").map(|(brep, _)| brep)
 }
 
 /// Natural sort key: 2 before 10.
@@ -274,6 +348,7 @@ impl<'m> Translation<'m> {
         let identity = vec![Placement::IDENTITY];
         let parts = self.names_of_parts();
         let mut solids = Solids::default();
+        let mut hidden = 0;
         for face in order {
             let body = shell_body.get(face.shell.as_str());
             let solid = body.is_some_and(|body| body.kind == BodyKind::Solid);
@@ -283,6 +358,10 @@ impl<'m> Translation<'m> {
             let homes = body
                 .and_then(|body| homes.get(body.id.as_str()))
                 .unwrap_or(&identity);
+            if stated.leaves_out_hidden() && body.is_some_and(|body| body.visible == Some(false)) {
+                hidden += homes.len();
+                continue;
+            }
             let name = entity(face.id.as_str());
             let surface = match self.surface(face.surface.as_str(), 0) {
                 Ok(surface) => surface,
@@ -310,25 +389,13 @@ impl<'m> Translation<'m> {
             } else {
                 -1.0
             };
-            let colour = face.color.or(body.and_then(|body| body.color)).map(|colour| {
-                #[allow(
-                    clippy::cast_possible_truncation,
-                    clippy::cast_sign_loss,
-                    reason = "rounded, 0 to 255"
-                )]
-                [colour.r(), colour.g(), colour.b()]
-                    .map(|share| (share * 255.0).round().clamp(0.0, 255.0) as u8)
-            });
+            let colour = face.color.or(body.and_then(|body| body.color)).map(rgb);
             let part = body.and_then(|body| parts.get(body.id.as_str()).copied());
-            let label = [
+            let label = label([
                 face.name.as_deref(),
                 body.and_then(|body| body.name.as_deref()),
                 part,
-            ]
-            .into_iter()
-            .flatten()
-            .find(|text| !text.trim().is_empty())
-            .map(|text| shortened(text.trim()));
+            ]);
             for (copy, home) in homes.iter().enumerate() {
                 if model.faces.len() >= FACES_MAX {
                     let what = format!("the file's assembly places more than {FACES_MAX} faces");
@@ -361,10 +428,16 @@ impl<'m> Translation<'m> {
         }
         model.solids = solids.all();
         let named = model.left_out;
-        let owned = self.lone_surfaces(&mut model, stated);
+        let owned = self.lone_surfaces(&mut model, stated, &mut hidden);
         let unread = self.unread_faces(stated).len();
         // A face that was not read may be counted already, by its surface.
         model.left_out = model.left_out.max((named + unread).saturating_sub(owned));
+        if hidden > 0 {
+            let what = format!(
+                "faces of hidden objects, which are left out: {hidden}; show the objects to have them"
+            );
+            model.warnings.insert(0, what);
+        }
         model.warnings.truncate(WARNINGS_MAX);
         Ok(model)
     }
@@ -383,7 +456,7 @@ impl<'m> Translation<'m> {
     }
 
     /// Surfaces without a face, common in IGES files. Returns how many of them are taken in with the boundary of a face that was not read.
-    fn lone_surfaces(&self, model: &mut Model, stated: &dyn Stated) -> usize {
+    fn lone_surfaces(&self, model: &mut Model, stated: &dyn Stated, hidden: &mut usize) -> usize {
         let mut owned = 0;
         let mut used: Vec<&str> = self
             .source
@@ -410,38 +483,56 @@ impl<'m> Translation<'m> {
             .filter(|surface| used.binary_search(&surface.id.as_str()).is_err())
             .collect();
         order.sort_by_cached_key(|surface| natural(surface.id.as_str()));
+        let joined: HashSet<&str> = self
+            .source
+            .faces
+            .iter()
+            .filter_map(|face| brep_of(face.surface.as_str()))
+            .collect();
         for item in order {
             let name = entity(item.id.as_str());
+            let object = item.source_object.as_ref();
+            let is_of_brep = object.is_some_and(|object| {
+                object.format == CodecFormat::Rhino
+                    && object.geometry_role == Some(SourceGeometryRole::Support)
+            });
+            if is_of_brep && brep_of(item.id.as_str()).is_some_and(|brep| joined.contains(brep)) {
+                // A leftover of which no face of its Brep is a part.
+                continue;
+            }
+            if stated.leaves_out_hidden() && object.is_some_and(|object| object.visible == Some(false)) {
+                *hidden += 1;
+                continue;
+            }
+            let of = match stated.owner(&name) {
+                Some(owner) => Some(format!("it is of {owner}, which was not read")),
+                None if is_of_brep => Some("the edges of its polysurface were not read".to_owned()),
+                None => None,
+            };
             match self.surface(item.id.as_str(), 0) {
-                Ok(surface) if surface.domain().iter().all(Option::is_some) => model.faces.push(Face {
-                    number: 0,
-                    name: None,
-                    colour: None,
-                    boundary: match stated.owner(&name) {
-                        Some(owner) => {
-                            owned += 1;
-                            Boundary::Unknown(format!("it is of {owner}, which was not read"))
-                        }
-                        None if self.is_part_of_surface(item.id.as_str()) => {
-                            Boundary::Unknown("it is a part of another surface".to_owned())
-                        }
-                        None => Boundary::Natural,
-                    },
-                    entity: name,
-                    surface,
-                    sense: 1.0,
-                    solid: false,
-                }),
+                Ok(surface) if surface.domain().iter().all(Option::is_some) => {
+                    owned += usize::from(of.is_some() && !is_of_brep);
+                    let is_part = self.is_part_of_surface(item.id.as_str());
+                    let why = of.or(is_part.then(|| "it is a part of another surface".to_owned()));
+                    model.faces.push(Face {
+                        number: 0,
+                        name: label([object.and_then(|object| object.name.as_deref())]),
+                        colour: object.and_then(|object| object.color).map(rgb),
+                        boundary: why.map_or(Boundary::Natural, Boundary::Unknown),
+                        entity: name,
+                        surface,
+                        sense: 1.0,
+                        solid: false,
+                    });
+                }
                 Ok(_) => {
-                    if let Some(owner) = stated.owner(&name) {
+                    if let Some(why) = of {
                         model.left_out += 1;
-                        model.warnings.push(format!(
-                            "surface {name} is left out: it is of {owner}, which was not read"
-                        ));
+                        model.warnings.push(format!("surface {name} is left out: {why}"));
                     }
                 }
                 Err(why) => {
-                    model.left_out += usize::from(stated.owner(&name).is_some());
+                    model.left_out += 1;
                     model.warnings.push(format!("surface {name} is left out: {why}"));
                 }
             }

@@ -7,6 +7,7 @@
 //! readers.rs   by the file's first bytes ─► step.rs, iges.rs, rhino.rs   what can be checked before the whole file is read
 //!                           step_records.rs, step_units.rs, iges_entries.rs ◄─┤   what the text says, for the cross-check
 //!                                                            iges_spline.rs ◄─┤   entities 114 as 128
+//!                                                          rhino_objects.rs ◄─┤   objects of which no surface is read
 //!                                                                             └─► ir.rs, ir_*.rs   cadmpeg's model -> cad::Face
 //! ```
 
@@ -20,6 +21,7 @@ mod ir_geometry;
 mod ir_index;
 mod readers;
 mod rhino;
+mod rhino_objects;
 mod step;
 mod step_records;
 mod step_units;

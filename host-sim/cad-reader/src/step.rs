@@ -54,7 +54,7 @@ impl Reader for Step {
         let mut readable = bytes.clone();
         units.only_of_shapes(&mut readable);
         let codec = cadmpeg_codec_step::StepCodec::default();
-        ir::decode(file, &codec, readable, &Text { records, units })
+        ir::decode(file, &codec, &readable, &Text { records, units })
     }
 }
 

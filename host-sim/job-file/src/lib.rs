@@ -39,7 +39,7 @@ pub use file::{
     TOLERANCE_DEFAULT_MM, TOLERANCE_MAX_MM,
 };
 pub use machine::HEIGHT_MAX_MM;
-pub use program::jobs_of;
+pub use program::{file_of, jobs_of};
 pub use steps::slots_max_us;
 
 /// Distance by which the surface of a face extends beyond the face, in step-overs on a plane: passes begin and end half a step-over beside the face, and a step-over on a

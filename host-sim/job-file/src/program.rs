@@ -27,6 +27,12 @@ fn split(path: &Path) -> (PathBuf, Option<usize>) {
     named.map_or_else(|| (path.to_owned(), None), |(file, number)| (file, Some(number)))
 }
 
+/// The file that a job's path names, without the face of `FILE#FACE`.
+#[must_use]
+pub fn file_of(path: &Path) -> PathBuf {
+    split(path).0
+}
+
 /// The jobs of a file: `FILE#FACE` for each face of a job of many, else the file itself.
 ///
 /// # Errors

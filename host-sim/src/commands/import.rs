@@ -63,7 +63,7 @@ pub(super) struct Arguments {
     /// Writes the job into this file.
     #[arg(short, long, value_name = "JOB")]
     output: Option<PathBuf>,
-    /// Overwrites an existing job file or page.
+    /// Overwrites an existing job file or page; with --part, removes the jobs of an earlier import from the folder -o.
     #[arg(long)]
     force: bool,
     /// Largest deviation of an approximation from the surface, mm.

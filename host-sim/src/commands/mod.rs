@@ -293,9 +293,9 @@ impl job_file::FaceReader for Faces {
     }
 }
 
-/// Reads a job file, and notes it as an input.
+/// Reads a job, which may be one face of a file (`FILE#FACE`), and notes the file as an input.
 fn read_job(path: &Path, profile: Option<&MachineProfile>) -> Result<Job> {
-    output_file::note_input(path);
+    output_file::note_input(&job_file::file_of(path));
     Ok(job_file::load_on(path, &Faces, profile)?)
 }
 

@@ -143,6 +143,22 @@ fn outputs_are_not_overwritten() {
     assert_eq!(names(folder.path()), before);
 }
 
+/// The file of a job of many faces, of which `FILE#FACE` is one, is what the command reads.
+#[test]
+fn the_file_of_many_jobs_stays() {
+    let folder = tempfile::tempdir().unwrap();
+    let sheet = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/hostile_cad/sound.step");
+    std::fs::copy(sheet, folder.path().join("sheet.step")).unwrap();
+    let job = "[part]\npath = \"sheet.step\"\n[tool]\nkind = \"ball\"\nradius_mm = 3\n[cut]\nfeed_mm_min = 600\n\
+               scallop_mm = 0.01\nalong = \"u\"\nside = \"up\"\n[[face]]\nface = 1\n";
+    let path = folder.path().join("part.toml");
+    std::fs::write(&path, job).unwrap();
+    let output = run(folder.path(), "simulate part.toml#1 --trace part.toml --force");
+    assert_eq!(output.status.code(), Some(2), "{}", err(&output));
+    assert!(err(&output).contains("is what the command"), "{}", err(&output));
+    assert_eq!(std::fs::read_to_string(path).unwrap(), job);
+}
+
 /// A command that is killed while it writes leaves what was there, and nothing else.
 #[test]
 fn a_killed_command_leaves_no_file() {

@@ -142,3 +142,50 @@ fn a_page_shows_the_part() {
     let again = run(folder.path(), "import blade.step --list --page blade.html");
     assert_eq!(again.status.code(), Some(2), "{}", err(&again));
 }
+
+/// The command of the page machines a trimmed face as it is; the whole rectangle only where the boundary is not known, and then the page tells.
+#[test]
+fn the_page_leaves_trimmed_faces_trimmed() {
+    let folder = tempfile::tempdir().unwrap();
+    let cad = Path::new(env!("CARGO_MANIFEST_DIR")).join("../jobs/cad/blade.step");
+    let text = std::fs::read_to_string(cad).unwrap();
+    let lost = text.replace("#618 = CIRCLE(", "#618 = CLOTHOID(");
+    assert_ne!(lost, text);
+    std::fs::write(folder.path().join("part.step"), lost).unwrap();
+    let listed = json(folder.path(), "import part.step --list --page part.html --json");
+    let page = std::fs::read_to_string(folder.path().join("part.html")).unwrap();
+    let (_, data) = page.split_once("id=\"data\">").unwrap();
+    let data: Value = serde_json::from_str(data.split_once("</script>").unwrap().0).unwrap();
+    let mut trimmed = 0;
+    for (face, listed) in data["faces"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .zip(listed["faces"].as_array().unwrap())
+    {
+        let unknown = listed["boundary_known"] == false;
+        trimmed += usize::from(!unknown && listed["trimmed"] == true);
+        let [command, state] = ["command", "state"].map(|key| face[key].as_str().unwrap());
+        assert_eq!(command.contains("--untrimmed"), unknown, "{face}");
+        assert_eq!(state.contains("the whole rectangle"), unknown, "{face}");
+    }
+    assert!(trimmed > 0);
+}
+
+/// A face that bounds no solid is machined from above, whichever way its normal points: `--only up` lists it.
+#[test]
+fn a_face_that_is_machined_from_above_is_listed_as_up() {
+    let folder = tempfile::tempdir().unwrap();
+    let sheet = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/hostile_cad/sound.step");
+    let sheet = std::fs::read_to_string(sheet).unwrap();
+    let turned = sheet.replace("(#23),#30,.T.)", "(#23),#30,.F.)");
+    assert_ne!(turned, sheet);
+    for (name, text) in [("sheet", sheet), ("turned", turned)] {
+        std::fs::write(folder.path().join(format!("{name}.step")), text).unwrap();
+        let list = json(
+            folder.path(),
+            &format!("import {name}.step --list --only up --json"),
+        );
+        assert_eq!(list["faces"].as_array().unwrap().len(), 1, "{name}");
+    }
+}

@@ -2,7 +2,7 @@
 
 use std::str::FromStr;
 
-use super::list::{Row, normal};
+use super::list::Row;
 
 /// Least z of a mean normal that faces up.
 const UP: f64 = 0.1;
@@ -10,7 +10,7 @@ const UP: f64 = 0.1;
 /// What a face has to be.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Condition {
-    /// Its normal points up.
+    /// The side that is machined faces up.
     Up,
     /// It is the whole rectangle of its surface.
     Whole,
@@ -83,9 +83,7 @@ impl Condition {
         let face = row.face;
         let measured = row.becomes.as_ref().ok().map(|(_, measures)| measures);
         match self {
-            Self::Up => measured
-                .and_then(|measures| normal(face, measures))
-                .is_some_and(|[_, _, z]| z > UP),
+            Self::Up => row.machined_normal().is_some_and(|[_, _, z]| z > UP),
             Self::Whole => row.becomes.is_ok() && row.trimmed.is_none(),
             Self::Kind(word) => face.surface.kind().to_lowercase().contains(word),
             Self::Name(word) => face

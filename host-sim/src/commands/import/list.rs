@@ -86,9 +86,14 @@ impl Key {
 }
 
 /// Mean normal of a face of a solid out of the material, of another face by its orientation; `None` for a closed surface.
-pub(super) fn normal(face: &Face, measures: &Measures) -> Option<[f64; 3]> {
-    let length = measures.facing.iter().map(|x| x * x).sum::<f64>().sqrt();
-    (length > 1e-6).then(|| measures.facing.map(|x| x * face.sense / length))
+fn normal(face: &Face, measures: &Measures) -> Option<[f64; 3]> {
+    unit(measures.facing, face.sense)
+}
+
+/// A vector, turned by a sign, of length 1; `None` for a vanishing one.
+fn unit(vector: [f64; 3], sign: f64) -> Option<[f64; 3]> {
+    let length = vector.iter().map(|x| x * x).sum::<f64>().sqrt();
+    (length > 1e-6).then(|| vector.map(|x| x * sign / length))
 }
 
 /// A line of the list.
@@ -104,6 +109,12 @@ pub(super) struct Row<'f> {
 }
 
 impl Row<'_> {
+    /// Mean normal of the side that is machined; `None` for a closed surface.
+    pub(super) fn machined_normal(&self) -> Option<[f64; 3]> {
+        let (_, measures) = self.becomes.as_ref().ok()?;
+        unit(measures.facing, machined_sign(self.face, measures))
+    }
+
     /// Whether the face is trimmed, in a word.
     pub(super) fn boundary(&self) -> &'static str {
         match (&self.trimmed, self.unknown) {

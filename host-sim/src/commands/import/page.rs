@@ -74,17 +74,20 @@ fn face(file: &str, row: &Row<'_>, quads: usize) -> Value {
         (Err(_), _) => "cannot be imported",
         (Ok(_), "no") => "whole",
         (Ok(_), "yes") => "trimmed",
-        (Ok(_), _) => "boundary unknown",
+        (Ok(_), _) => {
+            "boundary unknown: --untrimmed machines the whole rectangle of its surface, wherever the face ends"
+        }
     };
     let undercut = row.facing.filter(|facing| facing.down_share > 0.0).map(words);
     let state = undercut.map_or_else(
         || state.to_owned(),
         |[undercut, turn]| format!("{state}; {undercut} looks down, turn: {turn}"),
     );
-    let untrimmed = if row.boundary() == "no" {
-        ""
-    } else {
+    // A trimmed face is machined as it is; without its boundary it is refused.
+    let untrimmed = if row.boundary() == "unknown" {
         " --untrimmed"
+    } else {
+        ""
     };
     let command = format!(
         "{} import {} --face {}{untrimmed} -o part.toml",

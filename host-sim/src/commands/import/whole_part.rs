@@ -107,7 +107,35 @@ impl<'a> Output<'a> {
         }
     }
 
-    /// Checks that the files may be written, and makes their folder.
+    /// The jobs of an earlier import in the folder: files named as [`Self::job`] does.
+    fn earlier_jobs(&self) -> Vec<PathBuf> {
+        if self.is_file {
+            return Vec::new();
+        }
+        let Ok(entries) = std::fs::read_dir(self.path) else {
+            // There is no folder yet.
+            return Vec::new();
+        };
+        let mut jobs: Vec<PathBuf> = entries
+            .flatten()
+            .filter(|entry| entry.file_name().to_str().is_some_and(is_job_name))
+            .map(|entry| entry.path())
+            .collect();
+        jobs.sort();
+        jobs
+    }
+
+    /// Removes those jobs of an earlier import over which none of these is written.
+    fn remove_earlier_jobs(&self, jobs: &[Option<PathBuf>]) -> Result<()> {
+        for stale in self.earlier_jobs() {
+            if !jobs.iter().flatten().any(|job| *job == stale) {
+                std::fs::remove_file(&stale).map_err(|error| super::super::cannot_write(&stale, &error))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Checks that the files may be written and those of an earlier import removed, and makes their folder.
     fn begin(&self, force: bool) -> Result<PathBuf> {
         let folder = self.folder();
         if self.is_file {
@@ -116,10 +144,22 @@ impl<'a> Output<'a> {
             }
         } else {
             output_file::check_folder(&folder, &["summary.json", "part.html"], force)?;
+            for job in self.earlier_jobs() {
+                output_file::check(&job, force)?;
+            }
         }
         std::fs::create_dir_all(&folder).map_err(|error| super::super::cannot_write(&folder, &error))?;
         Ok(folder)
     }
+}
+
+/// Whether a file is named as the job of a face in a folder is: `007-face-12.toml`.
+fn is_job_name(name: &str) -> bool {
+    let digits =
+        |text: &str, least: usize| text.len() >= least && text.bytes().all(|byte| byte.is_ascii_digit());
+    name.strip_suffix(".toml")
+        .and_then(|name| name.split_once("-face-"))
+        .is_some_and(|(place, face)| digits(place, 3) && digits(face, 1))
 }
 
 /// A planned part, and the paths of its output files.
@@ -188,12 +228,13 @@ pub(super) fn command(arguments: &Arguments, file: &str, model: &Arc<Model>, out
     }
     let mut jobs = vec![None; plans.len()];
     for (place, index) in (1..).zip(&order.faces) {
-        let plan = &plans[*index];
-        let path = output.job(place, plan.number);
-        if let Some(job) = plan.job.as_ref().filter(|_| !output.is_file) {
-            output_file::write(&path, job.text.as_bytes(), arguments.force)?;
+        jobs[*index] = Some(output.job(place, plans[*index].number));
+    }
+    output.remove_earlier_jobs(&jobs)?;
+    for (plan, path) in plans.iter().zip(&jobs).filter(|_| !output.is_file) {
+        if let (Some(job), Some(path)) = (&plan.job, path) {
+            output_file::write(path, job.text.as_bytes(), arguments.force)?;
         }
-        jobs[*index] = Some(path);
     }
     if output.is_file {
         let text = planner.text(&setup, &folder, output.path, &order, &plans);
@@ -295,6 +336,23 @@ fn without_jobs(arguments: &Arguments, file: &str, radius_mm: f64, plans: &[Face
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn jobs_of_an_earlier_import_are_known_by_their_names() {
+        for name in ["001-face-13.toml", "1000-face-2.toml"] {
+            assert!(is_job_name(name), "{name}");
+        }
+        for name in [
+            "01-face-1.toml",
+            "001-face-.toml",
+            "001-face-1b.toml",
+            "001-face-1.toml~",
+            "a01-face-1.toml",
+            "part.html",
+        ] {
+            assert!(!is_job_name(name), "{name}");
+        }
+    }
 
     #[test]
     fn a_refusal_names_its_face_once() {
