@@ -7,6 +7,7 @@ use inspect::FaultAt;
 use job::Job;
 use job::units::NM_PER_MM;
 use oracle::{AccuracyReport, PassSample, SampleCheck};
+use part::{PartCheck, PassCentres};
 use report::{Figure, Mark, Remarks, RidgePoint, Scallops, Sketch};
 use serde_json::{Value, json};
 use verify::Verdict;
@@ -20,7 +21,7 @@ use verify::swept::{FieldPoint, Progress};
 use super::out::say;
 use super::outcome::fault_json;
 use super::simulate::{WantedReport, report};
-use super::{Bar, Failure, Result, load, numbers, reach_words};
+use super::{Bar, Failure, Result, load, numbers, part_words, reach_words};
 use crate::motion::{self, MotionError};
 
 /// Largest path error that is accepted, as a share of the scallop limit, unless `--path-tolerance` gives it.
@@ -28,7 +29,7 @@ const PATH_SHARE: f64 = 0.1;
 
 /// Judges a motion from elsewhere on a job's surface, with its ball: samples of the ball's centre as CSV (t_s, x_mm, y_mm, z_mm; or a trace of
 /// simulate), or a program in G-code, read by LinuxCNC's rs274. Contact feed and its ripple, path error, scallop, gouge, the reach of the tool,
-/// axis limits; beside the figures of the core's own run of the job.
+/// the whole part, axis limits; beside the figures of the core's own run of the job.
 ///
 /// The contact is the surface's nearest point, so the motion may follow any pattern. Samples more than a tenth of the radius from contact
 /// are links.
@@ -48,6 +49,9 @@ pub(super) struct Arguments {
     /// Accepts centres this far from the exact offset surface, mm; default a tenth of the scallop limit.
     #[arg(long, value_name = "MM", value_parser = numbers::length, allow_negative_numbers = true)]
     path_tolerance: Option<f64>,
+    /// Passes a motion although faces of the job's part are not known, so that whether the tool cuts them is not checked.
+    #[arg(long)]
+    accept_unknown_faces: bool,
     /// Judges the motion alone, without a run of the core.
     #[arg(long)]
     alone: bool,
@@ -215,6 +219,31 @@ fn partial(fault: &FaultAt) -> String {
 /// Samples of a motion in contact, with what was found for each.
 type Samples = Vec<(PassSample, SampleCheck)>;
 
+/// What speaks against a motion.
+struct Found {
+    check: Option<PartCheck>,
+    failures: Vec<String>,
+    warnings: Vec<String>,
+}
+
+impl Found {
+    fn new(arguments: &Arguments, job: &Job, judged: &Judged, samples: &Samples) -> Result<Self> {
+        let mut failures = judged.failures(job, arguments.path_tolerance_mm(job));
+        let mut centres = PassCentres::default();
+        samples.iter().for_each(|(sample, _)| centres.add(sample));
+        let accepted_mm = arguments.path_tolerance.unwrap_or(0.0);
+        let check = part::check_run(job, &centres, &judged.links_mm, accepted_mm)?;
+        let reasons = |check| part_words::reasons(check, arguments.accept_unknown_faces);
+        let (of_part, warnings) = check.as_ref().map(reasons).unwrap_or_default();
+        failures.extend(of_part);
+        Ok(Self {
+            check,
+            failures,
+            warnings,
+        })
+    }
+}
+
 /// The page of a judged motion, beside the core's.
 fn page(
     arguments: &Arguments,
@@ -222,7 +251,7 @@ fn page(
     job: &Job,
     samples: &Samples,
     (judged, own): (&Judged, Option<&OwnRun>),
-    failures: &[String],
+    found: &Found,
 ) -> Result<Option<PathBuf>> {
     if wanted.is_none() {
         return Ok(None);
@@ -266,13 +295,11 @@ fn page(
     if let Some(highest) = judged.violating_scallop(job) {
         mark(format!("scallop {:.5} mm", highest.height_mm), highest);
     }
+    marks.extend(found.check.iter().flat_map(part_words::marks));
+    let fault = own.and_then(|own| own.fault.as_ref()).map(partial);
     let remarks = Remarks {
-        failures: failures.to_vec(),
-        warnings: own
-            .and_then(|own| own.fault.as_ref())
-            .map(partial)
-            .into_iter()
-            .collect(),
+        failures: found.failures.clone(),
+        warnings: fault.into_iter().chain(found.warnings.iter().cloned()).collect(),
         verified: true,
         figures: figures.collect(),
         scallops: Some(Scallops {
@@ -323,7 +350,8 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let progress: &dyn Progress = &bar;
     let mut samples = Samples::new();
     let mut keep = |sample: &PassSample, check: &SampleCheck| samples.push((*sample, *check));
-    let each = wanted.map(|_| &mut keep as &mut SampleObserver<'_>);
+    let is_kept = wanted.is_some() || job.origin.reach().is_some();
+    let each = is_kept.then_some(&mut keep as &mut SampleObserver<'_>);
     let theirs = judge(&job, &oracle, &given.centres_mm, each, progress);
     let own = if arguments.alone {
         None
@@ -334,20 +362,15 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     };
     bar.clear();
     let core_fault = own.as_ref().and_then(|own| own.fault.as_ref());
-    let failures = theirs.failures(&job, arguments.path_tolerance_mm(&job));
-    let page = page(
-        arguments,
-        wanted,
-        &job,
-        &samples,
-        (&theirs, own.as_ref()),
-        &failures,
-    )?;
+    let found = Found::new(arguments, &job, &theirs, &samples)?;
+    let passed = found.failures.is_empty();
+    let page = page(arguments, wanted, &job, &samples, (&theirs, own.as_ref()), &found)?;
     if arguments.json {
         let value = json!({
             "job": arguments.job.display().to_string(), "motion": arguments.motion.display().to_string(), "period_s": given.period_s,
             "given": object(&job, &theirs), "core": own.as_ref().map(|own| object(&own_job, &own.judged)),
-            "core_fault": core_fault.map(fault_json), "failures": failures, "passed": failures.is_empty(),
+            "core_fault": core_fault.map(fault_json), "part": found.check.as_ref().map(|check| part_words::json(&job, check)),
+            "failures": found.failures, "warnings": found.warnings, "passed": passed,
         });
         say!("{value}");
     } else {
@@ -364,15 +387,21 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
             say!("  {}", partial(fault));
         }
         reach_words::print(&job, &theirs.reach);
-        for failure in &failures {
+        if let Some(check) = &found.check {
+            part_words::print(&job, check);
+        }
+        for failure in &found.failures {
             say!("  FAIL {failure}");
+        }
+        for warning in &found.warnings {
+            say!("  warning: {warning}");
         }
         if let Some(page) = page {
             say!("  report {}", page.display());
         }
-        say!("  {}", if failures.is_empty() { "passed" } else { "FAILED" });
+        say!("  {}", if passed { "passed" } else { "FAILED" });
     }
-    if failures.is_empty() {
+    if passed {
         Ok(())
     } else {
         Err(Failure::Failed(None))

@@ -352,24 +352,6 @@ fn load(arguments: &Arguments, path: &Path) -> Result<(Job, Prepared)> {
     home::load(path, profile.as_ref(), arguments.placed.origin, None)
 }
 
-/// Faces of the part that are not known: a reason against the job unless they are accepted.
-fn unknown_faces(check: &PartCheck, is_accepted: bool, found: &mut Verification) {
-    if check.unknown == 0 {
-        return;
-    }
-    let what = format!(
-        "{} faces of the part are not known: whether the tool cuts them is not checked",
-        check.unknown
-    );
-    if is_accepted {
-        found.warnings.push(what);
-    } else {
-        found.failures.push(format!(
-            "{what}; repair them in the CAD system (the header of the job names them), or look at them and give --accept-unknown-faces"
-        ));
-    }
-}
-
 /// The job of passes of constant scallop height with straight ones, as it would be run.
 fn straight(job: &Job, stop: Stop) -> Option<(Job, Prepared)> {
     let job = Job {
@@ -425,13 +407,13 @@ fn verify_job(
     bar.clear();
     let mut found = found?;
     let check = match &centres {
-        Some(centres) => part::check_run(&job, centres, &found.measured.links_mm)?,
+        Some(centres) => part::check_run(&job, centres, &found.measured.links_mm, 0.0)?,
         None => None,
     };
     if let Some(check) = &check {
-        found.failures.extend(check.failures.iter().cloned());
-        unknown_faces(check, arguments.accept_unknown_faces, &mut found);
-        found.warnings.extend(check.warnings.iter().cloned());
+        let (failures, warnings) = part_words::reasons(check, arguments.accept_unknown_faces);
+        found.failures.extend(failures);
+        found.warnings.extend(warnings);
     }
     let RunMeasurements { findings, swept, .. } = &found.measured;
     let mut remarks = Remarks {

@@ -132,7 +132,7 @@ pub fn judge(
     let contact_mm = (CONTACT_SHARE * oracle.radius_mm).max(CONTACT_MIN_MM);
     let mut state = Contacts::new(job.feed_mm_s(), period_s);
     let mut last: Option<NearestPoint> = None;
-    let mut motion = Motion::default();
+    let mut motion = Ways::default();
     let mut stretches = Stretches::new(each, job, oracle.radius_mm);
     progress.begin("contacts", centres_mm.len() as u64);
     for (index, centre_mm) in centres_mm.iter().enumerate() {
@@ -156,15 +156,17 @@ pub fn judge(
         } else {
             state.leave();
         }
-        motion.add(cl_nm, touches, jumps && !job.machine.has_limits());
         // Without limits a motion may leave out its links.
-        if jumps && !job.machine.has_limits() {
+        let is_left_out = jumps && !job.machine.has_limits();
+        motion.add(cl_nm, touches, jumps, is_left_out);
+        if is_left_out {
             meter.discontinuity();
         }
         meter.add(index as u64, cl_nm);
         last = touches.then_some(nearest);
         progress.done(1);
     }
+    let motion = motion.finish();
     let (field, field_lines) = height_field(oracle, &path, progress);
     let stretches = stretches.finish();
     let around = Around {
@@ -177,6 +179,34 @@ pub fn judge(
     #[allow(clippy::cast_precision_loss, reason = "below 2^53")]
     let time_s = centres_mm.len() as f64 * period_s;
     state.finish(centres_mm.len(), time_s, around, meter.peaks())
+}
+
+/// The motion with its ways off the surface. What is between a sample in contact and one that is not, or one to which the contact jumps, is no pass: such a way begins with the
+/// sample in contact.
+#[derive(Default)]
+struct Ways {
+    motion: Motion,
+    /// The last sample: position, whether it is in contact, whether nothing is between it and the one before.
+    last: Option<([i32; 3], bool, bool)>,
+}
+
+impl Ways {
+    fn add(&mut self, cl_nm: [i32; 3], touches: bool, jumps: bool, is_left_out: bool) {
+        self.flush(touches && (is_left_out || !jumps));
+        self.last = Some((cl_nm, touches, is_left_out));
+    }
+
+    /// Adds the last sample; `goes_on`: the contact does.
+    fn flush(&mut self, goes_on: bool) {
+        if let Some((cl_nm, touches, is_left_out)) = self.last.take() {
+            self.motion.add(cl_nm, touches && goes_on, is_left_out);
+        }
+    }
+
+    fn finish(mut self) -> Motion {
+        self.flush(true);
+        self.motion
+    }
 }
 
 /// Whether the centre is on the tool's side of the surface.
