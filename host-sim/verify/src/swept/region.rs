@@ -118,7 +118,7 @@ struct Line {
     highest: Vec<FieldPoint>,
 }
 
-/// The lines and the places on them.
+/// The lines and the places on them, over the extent of the region.
 struct Grid {
     path: [f64; 2],
     side: [f64; 2],
@@ -129,11 +129,11 @@ struct Grid {
 
 impl Grid {
     fn new(job: &Job, oracle: &Oracle) -> Self {
-        let (path, side) = (oracle.path_range(), oracle.side_range());
+        let [path, side] = oracle.region_extent();
         let at = |[low, high]: [f64; 2], k: u32| {
             low + (high - low) * (f64::from(k) + 0.5) / f64::from(SPEED_LINES)
         };
-        // Most step-overs along and across the whole range.
+        // Most step-overs along and across all of it.
         let mut most = [0.0_f64; 2];
         for (i, k) in (0..SPEED_LINES).flat_map(|i| (0..SPEED_LINES).map(move |k| (i, k))) {
             let (u, v) = oracle.swapped(at(path, i), at(side, k));
@@ -333,4 +333,42 @@ fn maximum(value: impl Fn(f64) -> f64, [mut low, mut high]: [f64; 2]) -> f64 {
         }
     }
     if at_left > at_right { left } else { right }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use job::Region;
+
+    /// The places of a small region of a large surface are all within its extent, so it is measured as densely as a surface of its size.
+    #[test]
+    fn places_are_spent_on_the_region() {
+        let mut job = job_file::parse("plate.toml", include_str!("../../../../jobs/plate.toml")).unwrap();
+        job.scallop_mm = 2e-5;
+        let grid = |job: &Job| Grid::new(job, &Oracle::new(job).unwrap());
+        let [[u0, u1], [v0, v1]] = job.surface.domain();
+        let at = |u: f64, v: f64| [u0 + u * (u1 - u0), v0 + v * (v1 - v0)];
+        let square = |from: f64, to: f64| {
+            Region::new(vec![vec![at(from, from), at(to, from), at(to, to), at(from, to)]])
+        };
+        job.region = Some(square(0.0, 1.0));
+        let whole = grid(&job);
+        assert!(whole.places_a_step_over < 0.5 * FEW_A_STEP_OVER);
+        job.region = Some(square(0.5, 0.54));
+        let small = grid(&job);
+        assert!(
+            small.places_a_step_over >= FEW_A_STEP_OVER,
+            "{}",
+            small.places_a_step_over
+        );
+        let [low, high] = [at(0.5, 0.5), at(0.54, 0.54)];
+        let (first, last) = (small.place(0), small.place(small.places - 1));
+        let (path, side) = match job.along {
+            Along::U => (0, 1),
+            _ => (1, 0),
+        };
+        assert!(low[side] < first && last < high[side]);
+        let (first, last) = (small.line(0), small.line(small.lines - 1));
+        assert!(low[path] < first && last < high[path]);
+    }
 }
