@@ -215,10 +215,7 @@ pub(super) fn print(
     if job.overrun_mm > 0.0 {
         row(
             "turns",
-            &format!(
-                "up to {} mm beyond the boundary: what stands there is not known to the job, and not checked",
-                job.overrun_mm
-            ),
+            &format!("up to {} mm beyond the boundary: {}", job.overrun_mm, beside(job)),
         );
     }
     row(
@@ -254,6 +251,27 @@ fn scallop(job: &Job, found: &SweptResult) {
     let (most, error) = (&found.scallop_max, &found.measurement_error);
     say!(
         "  {} {:<22} {:.4} um +- {:.4}, limit {} (max / limit {:.4}), between passes {} and {}, u = {:.6}, v = {:.6}",
+/// What of that which stands beside the surface is checked.
+fn beside(job: &Job) -> String {
+    let setup = &job.setup;
+    let named: Vec<&str> = [
+        (job.origin.part().is_some(), "[part]"),
+        (setup.stock.is_some(), "[stock]"),
+        (!setup.fixtures.is_empty(), "[[fixture]]"),
+    ]
+    .into_iter()
+    .filter_map(|(is_named, name)| is_named.then_some(name))
+    .collect();
+    if named.is_empty() {
+        "what stands there is not known to the job, and not checked".to_owned()
+    } else {
+        format!(
+            "of what stands there {} is checked, nothing else",
+            named.join(", ")
+        )
+    }
+}
+
         mark(found.scallop_verdict),
         "scallop height",
         um(most.height_mm),
@@ -415,4 +433,18 @@ mod tests {
         peak.reached_s = peak.base_s;
         assert_eq!(bases(&peak, 1.85), ", over 6.000 ms within 1.85 %");
     }
+    #[test]
+    fn turns_are_checked_against_what_the_job_names() {
+        let plate = include_str!("../../../jobs/plate_machine.toml");
+        let of = |rest: &str| beside(&job_file::parse("plate.toml", &format!("{plate}\n{rest}")).unwrap());
+        assert!(of("").contains("not checked"));
+        let named = of(
+            "[stock]\nbox_mm = [[0, 1], [0, 1], [0, 1]]\n[[fixture]]\nbox_mm = [[0, 1], [0, 1], [0, 1]]\n",
+        );
+        assert_eq!(
+            named,
+            "of what stands there [stock], [[fixture]] is checked, nothing else"
+        );
+    }
+
 }
