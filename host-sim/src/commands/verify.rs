@@ -1,5 +1,6 @@
 //! `verify`: checks every sample of a job against the independent oracle.
 
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -263,6 +264,25 @@ fn folder_of(job: &Path) -> String {
     }
 }
 
+/// Refuses jobs whose reports would be in one folder.
+fn have_own_folders<'a>(jobs: impl Iterator<Item = &'a Path>) -> Result<()> {
+    let mut folders: HashMap<String, &Path> = HashMap::new();
+    for job in jobs {
+        let folder = folder_of(job);
+        if let Some(other) = folders.insert(folder.clone(), job) {
+            return Err(Failure::input(
+                format!(
+                    "the reports of {} and {} would both be in the folder {folder}",
+                    other.display(),
+                    job.display()
+                ),
+                "verify them one after the other, each with a folder of its own for --report",
+            ));
+        }
+    }
+    Ok(())
+}
+
 /// Verifies the jobs, prints the figures, and fails if any job does; with the exit code of bad input if a job cannot be read.
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let mut jobs = Vec::new();
@@ -270,6 +290,9 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         let faces = job_file::jobs_of(path)?;
         let stops = stops(&faces, |face| load(arguments, face).ok())?;
         jobs.extend(faces.into_iter().zip(stops));
+    }
+    if arguments.report.is_some() {
+        have_own_folders(jobs.iter().map(|(job, _)| job.as_path()))?;
     }
     if let [(job, stop)] = jobs.as_slice() {
         let (passed, value) = verify_job(arguments, job, *stop, arguments.report.as_deref())?;
@@ -448,6 +471,19 @@ fn verify_job(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn no_two_reports_share_a_folder() {
+        let jobs = |names: &[&'static str]| have_own_folders(names.iter().map(Path::new));
+        assert!(jobs(&["a/part.toml#1", "a/part.toml#2", "a/plate.toml"]).is_ok());
+        for same in [
+            ["a/part.toml", "b/part.toml"],
+            ["part.toml#34", "part-34.toml"],
+            ["a.toml", "a.toml"],
+        ] {
+            assert!(jobs(&same).is_err(), "{same:?}");
+        }
+    }
 
     #[test]
     fn each_face_of_a_part_has_a_folder() {
