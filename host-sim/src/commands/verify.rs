@@ -162,6 +162,13 @@ fn marks(job: &Job, timed: &TimedRun, measured: &RunMeasurements) -> Vec<Mark> {
             tick: None,
         });
     }
+    if let Some(highest) = swept.violating_place() {
+        marks.push(Mark {
+            what: format!("{:.5} mm left in the region", highest.height_mm),
+            place_mm: highest.point_mm,
+            tick: None,
+        });
+    }
     marks.extend(reach_words::marks(job, &measured.reach));
     marks
 }
@@ -471,6 +478,37 @@ fn verify_job(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A place of the region that is too high does not make the ridges so: it has its own figures and its own mark.
+    #[test]
+    fn a_region_and_its_ridges_have_their_own_figures() {
+        let text = include_str!("../../../jobs/region.toml");
+        let mut job = job_file::parse("region.toml", text).unwrap();
+        job.scallop_mm = 0.2;
+        let (job, prepared) = settled(job).unwrap();
+        let timed = timed(&job, &prepared).unwrap();
+        let requirements = Requirements {
+            with_optimum: false,
+            swept: swept::Requirements::default(),
+            straight: None,
+        };
+        let mut found = verify_run(&job, &prepared, &timed, None, &requirements, &()).unwrap();
+        assert!(found.failures.is_empty(), "{:?}", found.failures);
+        let highest = found.measured.swept.region.unwrap().highest.unwrap();
+        found.measured.swept.region_verdict = Verdict::Violated;
+        let [mark] = &marks(&job, &timed, &found.measured)[..] else {
+            panic!("one mark: the region's");
+        };
+        assert_eq!(mark.place_mm, highest.point_mm);
+        assert!(mark.what.contains("in the region"), "{}", mark.what);
+        found.measured.swept.scallop_verdict = Verdict::Unknown;
+        let json = json(&job, &prepared, &found);
+        assert_eq!(
+            (&json["scallop_max_mm"], &json["scallop_at"]),
+            (&Value::Null, &Value::Null)
+        );
+        assert_eq!(json["region_heights"]["highest_mm"], highest.height_mm);
+    }
 
     #[test]
     fn no_two_reports_share_a_folder() {

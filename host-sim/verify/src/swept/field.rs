@@ -99,8 +99,8 @@ pub fn height_field(
     });
     let starts = || places.iter().map(|(place, _)| *place).collect();
     let field = HeightField {
-        highest: heights.extreme(starts(), 1.0, [du, dv]),
-        lowest: heights.extreme(starts(), -1.0, [du, dv]),
+        highest: heights.extreme(starts(), 1.0, [du, dv]).unwrap_or_default(),
+        lowest: heights.extreme(starts(), -1.0, [du, dv]).unwrap_or_default(),
         mean_mm: if area > 0.0 { sum / area } else { 0.0 },
         uncut_share: if area > 0.0 { uncut.abs() / area } else { 0.0 },
         points: places.len(),
@@ -138,7 +138,12 @@ impl Heights<'_> {
     }
 
     /// The highest place (`sign` 1), or the lowest (-1), from the best of these; `steps`: first steps of the search in u and v.
-    pub(super) fn extreme(&self, mut starts: Vec<FieldPoint>, sign: f64, steps: [f64; 2]) -> FieldPoint {
+    pub(super) fn extreme(
+        &self,
+        mut starts: Vec<FieldPoint>,
+        sign: f64,
+        steps: [f64; 2],
+    ) -> Option<FieldPoint> {
         starts.sort_by(|a, b| (sign * b.height_mm).total_cmp(&(sign * a.height_mm)));
         let searched = starts
             .par_iter()
@@ -151,7 +156,7 @@ impl Heights<'_> {
                 a
             }
         };
-        searched.reduce_with(best).unwrap_or_default()
+        searched.reduce_with(best)
     }
 
     /// Lines of the field along the path parameter, through the middles of evenly spread cells.
