@@ -154,6 +154,68 @@ fn jobs_of_an_earlier_import_do_not_stay() {
     assert!(!folder.join(stale).exists() && folder.join(mine).is_file());
 }
 
+/// A motion that cuts the face as it should, and then goes down through the part: `judge` looks at the whole part, too, beside the job's face.
+#[test]
+fn a_motion_through_the_part_is_no_pass() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    std::fs::copy(cad("blade.step"), folder.join("blade.step")).unwrap();
+    let import =
+        "import blade.step --part --tool 3 --scallop-mm 1 --feed-mm-min 3000 --faces 13 -o part.toml --json";
+    let (summary, code) = json(folder, import);
+    assert_eq!(code, Some(0), "{summary}");
+    assert_eq!(
+        run(folder, "simulate part.toml#13 --trace own.csv").status.code(),
+        Some(0)
+    );
+    let (found, code) = json(folder, "judge part.toml#13 own.csv --alone --json");
+    assert_eq!(
+        (code, &found["part"]["checked"]),
+        (Some(0), &Value::Bool(true)),
+        "{found}"
+    );
+    let trace = std::fs::read_to_string(folder.join("own.csv")).unwrap();
+    let fields = |line: &str| -> Vec<f64> {
+        line.split(',')
+            .map(|field| field.parse().unwrap_or(0.0))
+            .collect()
+    };
+    let mut table = "t_s,x_mm,y_mm,z_mm\n".to_owned();
+    for at in trace.lines().skip(1).map(fields) {
+        table += &format!(
+            "{},{},{},{}\n",
+            at[1],
+            at[10] * 1e-6,
+            at[11] * 1e-6,
+            at[12] * 1e-6
+        );
+    }
+    // From the end of the run, above the part, to below the last place on a pass.
+    let end_s = fields(trace.lines().last().unwrap())[1];
+    let at = fields(trace.lines().rfind(|line| line.contains(",running,")).unwrap());
+    for step in [1.0, 2.0] {
+        table += &format!(
+            "{},{},{},{}\n",
+            end_s + step * 1e-3,
+            at[10] * 1e-6,
+            at[11] * 1e-6,
+            at[12] * 1e-6 - step
+        );
+    }
+    std::fs::write(folder.join("through.csv"), table).unwrap();
+    let (found, code) = json(folder, "judge part.toml#13 through.csv --alone --json");
+    // So fast a way down exceeds the limits, too.
+    let failures = found["failures"].to_string();
+    assert!(
+        code == Some(1) && failures.contains("enters face") && failures.contains("between passes"),
+        "{found}"
+    );
+    assert!(
+        number(&found["part"]["deepest_between"]["depth_mm"]) > 0.5,
+        "{found}"
+    );
+}
+
 /// A face that looks down is turned up; the file's +z reaches nothing of it.
 #[test]
 fn the_best_side_is_turned_up() {

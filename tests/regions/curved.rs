@@ -62,7 +62,8 @@ fn assert_finished(job: &Job, followed: &Followed, about: &str) {
     assert!(failures.is_empty(), "{about}: {failures:?}");
     let (field, _) = height_field(&followed.oracle, &followed.track, &());
     let most = (1.0 + ERROR_SHARE_MAX) * job.scallop_mm;
-    assert!(field.highest.height_mm <= most, "{about}: {:?}", field.highest);
+    let highest_mm = field.highest.map_or(0.0, |highest| highest.height_mm);
+    assert!(highest_mm <= most, "{about}: {:?}", field.highest);
 }
 
 /// Regions in cells, two of which touched where neither had its first or its last line: 2 to 196 % above the scallop limit.
@@ -133,11 +134,13 @@ fn strips_narrower_than_a_step_over_are_measured() {
             "{spacing:?}: ridges {:.4} mm, {region:?}",
             swept.scallop_max.height_mm
         );
-        assert_eq!(swept.scallop_verdict, Verdict::Met, "{:?}", swept.failures);
-        assert!(region.ridges_share < 0.5 && region.highest.height_mm > 0.9 * job.scallop_mm);
-        let by_samples = height_by_samples(&followed.oracle, &followed.track, region.highest.uv);
+        let verdicts = (swept.scallop_verdict, swept.region_verdict);
+        assert_eq!(verdicts, (Verdict::Met, Verdict::Met), "{:?}", swept.failures);
+        let highest = region.highest.unwrap();
+        assert!(region.ridges_share < 0.5 && highest.height_mm > 0.9 * job.scallop_mm);
+        let by_samples = height_by_samples(&followed.oracle, &followed.track, highest.uv);
         assert!(
-            (by_samples / region.highest.height_mm - 1.0).abs() < 0.01,
+            (by_samples / highest.height_mm - 1.0).abs() < 0.01,
             "{by_samples}"
         );
         let mut served = 0;
@@ -146,10 +149,7 @@ fn strips_narrower_than_a_step_over_are_measured() {
             if followed.oracle.is_served(u, v) {
                 served += 1;
                 let height_mm = height_by_samples(&followed.oracle, &followed.track, [u, v]);
-                assert!(
-                    height_mm < 1.01 * region.highest.height_mm,
-                    "{height_mm} at {u}, {v}"
-                );
+                assert!(height_mm < 1.01 * highest.height_mm, "{height_mm} at {u}, {v}");
             }
         }
         assert!(served > 100, "{served}");
@@ -167,13 +167,50 @@ fn strips_narrower_than_a_step_over_are_measured() {
             let mut track = followed.track.clone();
             track.passes.remove(*without);
             let swept = measured(&track);
-            assert_eq!(swept.scallop_verdict, Verdict::Violated, "{spacing:?} {without}");
+            assert_eq!(swept.region_verdict, Verdict::Violated, "{spacing:?} {without}");
+            let place = swept.violating_place().unwrap();
+            assert!(place.height_mm > 1.01 * job.scallop_mm, "{place:?}");
             let failure = |reported: &String| {
                 reported.contains("mm high at u = ") || reported.contains("no ball reaches")
             };
             assert!(swept.failures.iter().any(failure), "{:?}", swept.failures);
         }
     }
+}
+
+/// A single pass has no ridge and no verdict on ridges; that on the places of the region is their own.
+#[test]
+fn places_and_ridges_have_their_own_verdicts() {
+    let mut job = load("plate_machine");
+    (job.spacing, job.scallop_mm, job.radius_mm) = (Spacing::Exact, 0.2, 6.0);
+    (job.along, job.machine.travel_mm) = (Along::U, None);
+    job.region = Some(Region::new(vec![vec![
+        [0.2, 0.5],
+        [0.8, 0.5],
+        [0.8, 0.7],
+        [0.2, 0.7],
+    ]]));
+    let followed = follow(&job);
+    let requirements = Requirements::default();
+    let measured = |track: &ToolPath| measure(&job, &followed.oracle, track, true, &requirements, &());
+    let whole = measured(&followed.track);
+    let verdicts = (whole.scallop_verdict, whole.region_verdict);
+    assert_eq!(verdicts, (Verdict::Met, Verdict::Met), "{:?}", whole.failures);
+    assert_eq!(whole.violating_place(), None);
+    let mut track = followed.track.clone();
+    track.passes.truncate(1);
+    let single = measured(&track);
+    let verdicts = (single.scallop_verdict, single.region_verdict);
+    assert_eq!(
+        verdicts,
+        (Verdict::Unknown, Verdict::Violated),
+        "{:?}",
+        single.failures
+    );
+    assert_eq!(
+        single.violating_place().copied(),
+        single.region.and_then(|region| region.highest)
+    );
 }
 
 /// A region that is the whole surface has the passes of the whole surface, but for the rounding of the lines.

@@ -98,18 +98,18 @@ impl RegionEdges {
         NEAR_PLACES * self.place[1]
     }
 
-    /// Least and greatest side parameter.
-    fn extent(&self) -> [f64; 2] {
-        let sides = self.edges.iter().flatten().map(|point| point[1]);
-        sides.fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], side| {
-            [least.min(side), most.max(side)]
+    /// Least and greatest path parameter (`axis` 0) or side parameter (1).
+    fn extent(&self, axis: usize) -> [f64; 2] {
+        let places = self.edges.iter().flatten().map(|point| point[axis]);
+        places.fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], at| {
+            [least.min(at), most.max(at)]
         })
     }
 
     /// Intervals of a line, ascending.
     fn intervals(&self, side: f64) -> Vec<[f64; 2]> {
         // The line on the upper boundary is the one below it.
-        let [least, most] = self.extent();
+        let [least, most] = self.extent(1);
         // A line on the lower boundary may be rounded to a place below it.
         let side = if side < least && least - side <= self.near_side() {
             least
@@ -203,6 +203,20 @@ impl Oracle {
             last = Some(*to);
         }
         lines
+    }
+
+    /// Ranges of the path parameter and of the side parameter between which the region lies, within those of the surface; these where the job has none.
+    #[must_use]
+    pub fn region_extent(&self) -> [[f64; 2]; 2] {
+        let ranges = [self.path_range(), self.side_range()];
+        let Some(region) = &self.region else {
+            return ranges;
+        };
+        std::array::from_fn(|axis| {
+            let [low, high] = ranges[axis];
+            let extent = region.extent(axis);
+            extent.map(|at| at.clamp(low, high))
+        })
     }
 
     /// Whether (u, v) is in the region; everything is where the job has none.
@@ -330,7 +344,7 @@ impl Oracle {
         let [(near, _), (far, _)] = passes;
         let is_between = |[start, end]: &[f64; 2]| *start < to && from < *end;
         self.cells.iter().any(|cell| {
-            let [_, most] = cell.extent();
+            let [_, most] = cell.extent(1);
             let holds = |(side, [from, to]): &(f64, [f64; 2])| {
                 // But for the rounding of its ends.
                 let is_of_pass =
@@ -434,7 +448,7 @@ impl Oracle {
     pub fn pass_range(&self) -> [f64; 2] {
         self.region
             .as_ref()
-            .map_or_else(|| self.side_range(), RegionEdges::extent)
+            .map_or_else(|| self.side_range(), |region| region.extent(1))
     }
 
     /// The first line of the region at a side parameter or above it that has an interval.

@@ -26,6 +26,18 @@ pub struct ErrorStatistics {
 }
 
 impl ErrorStatistics {
+    /// These, unless there are no values.
+    #[must_use]
+    pub fn measured(&self) -> Option<&Self> {
+        (self.count > 0).then_some(self)
+    }
+
+    /// Largest magnitude; `None` without values.
+    #[must_use]
+    pub fn largest(&self) -> Option<f64> {
+        self.measured().map(|errors| errors.max.abs())
+    }
+
     /// Root mean square; 0 without values.
     #[must_use]
     pub fn rms(&self) -> f64 {

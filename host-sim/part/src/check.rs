@@ -84,7 +84,8 @@ pub struct PartCheck {
     pub warnings: Vec<String>,
 }
 
-/// Checks the run of a job whose region was made from a face, with the ball's centres on its links, mm; `None` for other jobs.
+/// Checks the run of a job whose region was made from a face, with the ball's centres on its links, mm; `None` for other jobs. `accepted_mm`: a depth in the part that is
+/// accepted even if it is more than the part's tolerance.
 ///
 /// # Errors
 /// A CAD file cannot be read.
@@ -92,6 +93,7 @@ pub fn check_run(
     job: &Job,
     centres: &PassCentres,
     links_mm: &[Vec<DVec3>],
+    accepted_mm: f64,
 ) -> Result<Option<PartCheck>, FaceError> {
     let (Some(source), Some(reach)) = (job.origin.cad(), job.origin.reach()) else {
         return Ok(None);
@@ -115,7 +117,7 @@ pub fn check_run(
     let mut check = PartCheck {
         deepest,
         counts: [on_passes.len(), between.len()],
-        tolerance_mm: request.touch_mm,
+        tolerance_mm: request.touch_mm.max(accepted_mm),
         unknown: reach.unknown.len() + asked.part().map_or(0, |part| part.left_out),
         leftover,
         tick,
@@ -127,6 +129,17 @@ pub fn check_run(
 }
 
 impl PartCheck {
+    /// Why not all faces of the part were looked at; `None` where they were.
+    #[must_use]
+    pub fn unknown_faces(&self) -> Option<String> {
+        (self.unknown > 0).then(|| {
+            format!(
+                "{} faces of the part are not known: whether the tool cuts them is not checked",
+                self.unknown
+            )
+        })
+    }
+
     fn judge(&mut self) {
         for (found, place) in self.deepest.iter().flatten().zip(["on a pass", "between passes"]) {
             if let Some(found) = found.filter(|found| self.is_too_deep(found)) {

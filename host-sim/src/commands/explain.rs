@@ -116,7 +116,10 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let Some(code) = &arguments.code else {
         let all = entries();
         if arguments.json {
-            say!("{}", Value::Array(all.iter().map(json).collect()));
+            say!(
+                "{}",
+                serde_json::json!({ "entries": all.iter().map(json).collect::<Vec<_>>() })
+            );
         } else {
             list(&all);
         }

@@ -7,6 +7,7 @@ use inspect::FaultAt;
 use job::Job;
 use job::units::NM_PER_MM;
 use oracle::{AccuracyReport, PassSample, SampleCheck};
+use part::{PartCheck, PassCentres};
 use report::{Figure, Mark, Remarks, RidgePoint, Scallops, Sketch};
 use serde_json::{Value, json};
 use verify::Verdict;
@@ -20,7 +21,7 @@ use verify::swept::{FieldPoint, Progress};
 use super::out::say;
 use super::outcome::fault_json;
 use super::simulate::{WantedReport, report};
-use super::{Bar, Failure, Result, load, numbers, reach_words};
+use super::{Bar, Failure, Result, load, numbers, part_words, reach_words};
 use crate::motion::{self, MotionError};
 
 /// Largest path error that is accepted, as a share of the scallop limit, unless `--path-tolerance` gives it.
@@ -28,10 +29,10 @@ const PATH_SHARE: f64 = 0.1;
 
 /// Judges a motion from elsewhere on a job's surface, with its ball: samples of the ball's centre as CSV (t_s, x_mm, y_mm, z_mm; or a trace of
 /// simulate), or a program in G-code, read by LinuxCNC's rs274. Contact feed and its ripple, path error, scallop, gouge, the reach of the tool,
-/// axis limits; beside the figures of the core's own run of the job.
+/// the whole part, axis limits; beside the figures of the core's own run of the job.
 ///
 /// The contact is the surface's nearest point, so the motion may follow any pattern. Samples more than a tenth of the radius from contact
-/// are links.
+/// are links. Of a program the velocity is judged; acceleration and jerk are the machine's.
 ///
 /// Example: cargo sim judge jobs/torus.toml samples.csv
 /// Example: cargo sim judge jobs/plate_machine.toml posted.ngc --tip --json
@@ -48,6 +49,9 @@ pub(super) struct Arguments {
     /// Accepts centres this far from the exact offset surface, mm; default a tenth of the scallop limit.
     #[arg(long, value_name = "MM", value_parser = numbers::length, allow_negative_numbers = true)]
     path_tolerance: Option<f64>,
+    /// Passes a motion although faces of the job's part are not known, so that whether the tool cuts them is not checked.
+    #[arg(long)]
+    accept_unknown_faces: bool,
     /// Judges the motion alone, without a run of the core.
     #[arg(long)]
     alone: bool,
@@ -75,52 +79,91 @@ impl From<MotionError> for Failure {
     }
 }
 
+/// The keys of the figures of a motion; one that no sample tells is null, and named.
 fn object(job: &Job, judged: &Judged) -> Value {
-    let [velocity, acceleration, jerk] = &judged.axes;
-    let known = |peak: &verify::motion::Peak| peak.share.filter(|_| peak.verdict != Verdict::Unknown);
-    let limits =
-        json!({ "velocity": known(velocity), "acceleration": known(acceleration), "jerk": known(jerk) });
+    let mut value = figures(job, judged);
+    let mut keys = Vec::new();
+    nulls(&value, "", &mut keys);
+    // Without limits there is no share of them.
+    keys.retain(|key| key != "limits");
+    value["not_measured"] = keys.into();
+    value
+}
+
+/// Keys of null figures, those of objects within as `object.key`. What `reach` cannot measure has a verdict.
+fn nulls(value: &Value, before: &str, keys: &mut Vec<String>) {
+    for (key, value) in value.as_object().into_iter().flatten() {
+        let key = format!("{before}{key}");
+        match value {
+            Value::Null => keys.push(key),
+            Value::Object(_) if key != "reach" => nulls(value, &format!("{key}."), keys),
+            _ => {}
+        }
+    }
+}
+
+fn figures(job: &Job, judged: &Judged) -> Value {
+    let shares = judged.axes.map(|peak| {
+        let peak = peak.filter(|peak| peak.verdict != Verdict::Unknown);
+        peak.and_then(|peak| peak.share)
+    });
+    let [velocity, acceleration, jerk] = shares;
+    let limits = json!({ "velocity": velocity, "acceleration": acceleration, "jerk": jerk });
+    let [velocity, acceleration, jerk] = judged.axes.map(|peak| peak.map(|peak| peak.axes));
+    let path_error_at = judged
+        .path_error_mm
+        .map(|at| json!({ "sample": at.sample, "u": at.uv[0], "v": at.uv[1] }));
+    let scallop_at = judged
+        .field
+        .highest
+        .map(|at| json!({ "u": at.uv[0], "v": at.uv[1], "place_mm": at.point_mm.to_array() }));
     json!({
         "samples": judged.samples,
         "in_contact": judged.in_contact,
         "jumps": judged.jumps,
         "time_s": judged.time_s,
-        "feed_mm_s": { "programmed": job.feed_mm_s(), "min": judged.feed.range[0], "mean": judged.feed.mean, "max": judged.feed.range[1] },
+        "feed_mm_s": { "programmed": job.feed_mm_s(), "min": judged.feed.range.map(|[least, _]| least), "mean": judged.feed.mean, "max": judged.feed.range.map(|[_, most]| most) },
         "ripple_max_pct": judged.feed.ripple_max_pct,
         "ripple_rms_pct": judged.feed.ripple_rms_pct,
-        "path_error_max_mm": judged.path_error_mm.value.abs(),
+        "path_error_max_mm": path_error_mm(judged),
         "path_error_rms_mm": judged.path_error_rms_mm,
-        "path_error_at": { "sample": judged.path_error_mm.sample, "u": judged.path_error_mm.uv[0], "v": judged.path_error_mm.uv[1] },
-        "scallop_max_mm": judged.highest().height_mm,
+        "path_error_at": path_error_at,
+        "scallop_max_mm": judged.highest_mm(),
         "scallop_mean_mm": judged.field.mean_mm,
-        "scallop_at": { "u": judged.highest().uv[0], "v": judged.highest().uv[1], "place_mm": judged.highest().point_mm.to_array() },
+        "scallop_at": scallop_at,
         "uncut_share": judged.field.uncut_share,
         "gouge_max_mm": judged.gouge_mm(),
         "above_equator": judged.above_equator,
-        "normal_z_min": judged.steepest.value,
+        "normal_z_min": judged.steepest.map(|steepest| steepest.value),
         "reach": reach_words::json(job, &judged.reach),
         "limits": job.machine.has_limits().then_some(limits),
-        "axes": { "velocity_mm_s": velocity.axes, "acceleration_mm_s2": acceleration.axes, "jerk_mm_s3": jerk.axes },
+        "travel": { "extent_mm": judged.travel.extent_mm, "beyond_mm": judged.travel.beyond_mm },
+        "axes": { "velocity_mm_s": velocity, "acceleration_mm_s2": acceleration, "jerk_mm_s3": jerk },
     })
 }
 
-/// A row of the table: name, unit, figure.
-type Row = (&'static str, &'static str, Box<dyn Fn(&Judged) -> f64>);
+/// Largest path error, mm.
+fn path_error_mm(judged: &Judged) -> Option<f64> {
+    judged.path_error_mm.map(|error| error.value.abs())
+}
+
+/// A row of the table: name, unit, figure; `None` where the motion does not tell it.
+type Row = (&'static str, &'static str, Box<dyn Fn(&Judged) -> Option<f64>>);
 
 fn rows() -> Vec<Row> {
     let mut rows: Vec<Row> = vec![
-        ("jumps", "steps", Box::new(|judged| count(judged.jumps))),
-        ("time", "s", Box::new(|judged| judged.time_s)),
+        ("jumps", "steps", Box::new(|judged| Some(count(judged.jumps)))),
+        ("time", "s", Box::new(|judged| Some(judged.time_s))),
         (
             "contact feed, least",
             "mm/s",
-            Box::new(|judged| judged.feed.range[0]),
+            Box::new(|judged| judged.feed.range.map(|[least, _]| least)),
         ),
         ("contact feed, mean", "mm/s", Box::new(|judged| judged.feed.mean)),
         (
             "contact feed, largest",
             "mm/s",
-            Box::new(|judged| judged.feed.range[1]),
+            Box::new(|judged| judged.feed.range.map(|[_, most]| most)),
         ),
         (
             "feed ripple, largest",
@@ -135,41 +178,41 @@ fn rows() -> Vec<Row> {
         (
             "path error, largest",
             "um",
-            Box::new(|judged| 1e3 * judged.path_error_mm.value.abs()),
+            Box::new(|judged| um(path_error_mm(judged))),
         ),
         (
             "path error, rms",
             "um",
-            Box::new(|judged| 1e3 * judged.path_error_rms_mm),
+            Box::new(|judged| um(judged.path_error_rms_mm)),
         ),
         (
             "scallop, largest",
             "um",
-            Box::new(|judged| 1e3 * judged.highest().height_mm),
+            Box::new(|judged| um(judged.highest_mm())),
         ),
+        ("scallop, mean", "um", Box::new(|judged| um(judged.field.mean_mm))),
         (
-            "scallop, mean",
-            "um",
-            Box::new(|judged| 1e3 * judged.field.mean_mm),
+            "uncut",
+            "%",
+            Box::new(|judged| Some(100.0 * judged.field.uncut_share?)),
         ),
-        ("uncut", "%", Box::new(|judged| 100.0 * judged.field.uncut_share)),
-        ("gouge", "um", Box::new(|judged| 1e3 * judged.gouge_mm())),
+        ("gouge", "um", Box::new(|judged| um(judged.gouge_mm()))),
         (
             "above the equator",
             "samples",
-            Box::new(|judged| count(judged.above_equator)),
+            Box::new(|judged| Some(count(judged.above_equator))),
         ),
         (
             "surface looks down",
             "%",
-            Box::new(|judged| 100.0 * judged.reach.facing.down_share),
+            Box::new(|judged| Some(100.0 * judged.reach.facing.down_share)),
         ),
         (
             "reach: deepest touch",
             "um",
             Box::new(|judged| {
                 let touches = judged.reach.findings.iter().map(ReachFinding::touch_mm);
-                1e3 * touches.fold(0.0, f64::max)
+                um(Some(touches.fold(0.0, f64::max)))
             }),
         ),
     ];
@@ -177,10 +220,19 @@ fn rows() -> Vec<Row> {
         rows.push((
             name,
             unit,
-            Box::new(move |judged| judged.axes[order].axes.into_iter().fold(0.0, f64::max)),
+            Box::new(move |judged| Some(judged.axes[order]?.axes.into_iter().fold(0.0, f64::max))),
         ));
     }
     rows
+}
+
+fn um(mm: Option<f64>) -> Option<f64> {
+    mm.map(|mm| 1e3 * mm)
+}
+
+/// A figure in the table.
+fn cell(figure: Option<f64>) -> String {
+    figure.map_or_else(|| "-".to_owned(), |figure| format!("{figure:.6}"))
 }
 
 #[allow(clippy::cast_precision_loss, reason = "below 2^53")]
@@ -192,8 +244,8 @@ fn print(theirs: &Judged, ours: Option<&Judged>) {
     let heading = if ours.is_some() { "this core" } else { "" };
     say!("  {:<24}{:>16} {heading:>16}", "", "given");
     for (name, unit, figure) in rows() {
-        let own = ours.map_or_else(String::new, |ours| format!("{:.6}", figure(ours)));
-        say!("  {name:<24}{:>16.6} {own:>16} {unit}", figure(theirs));
+        let own = ours.map_or_else(String::new, |ours| cell(figure(ours)));
+        say!("  {name:<24}{:>16} {own:>16} {unit}", cell(figure(theirs)));
     }
 }
 
@@ -215,6 +267,31 @@ fn partial(fault: &FaultAt) -> String {
 /// Samples of a motion in contact, with what was found for each.
 type Samples = Vec<(PassSample, SampleCheck)>;
 
+/// What speaks against a motion.
+struct Found {
+    check: Option<PartCheck>,
+    failures: Vec<String>,
+    warnings: Vec<String>,
+}
+
+impl Found {
+    fn new(arguments: &Arguments, job: &Job, judged: &Judged, samples: &Samples) -> Result<Self> {
+        let mut failures = judged.failures(job, arguments.path_tolerance_mm(job));
+        let mut centres = PassCentres::default();
+        samples.iter().for_each(|(sample, _)| centres.add(sample));
+        let accepted_mm = arguments.path_tolerance.unwrap_or(0.0);
+        let check = part::check_run(job, &centres, &judged.links_mm, accepted_mm)?;
+        let reasons = |check| part_words::reasons(check, arguments.accept_unknown_faces);
+        let (of_part, warnings) = check.as_ref().map(reasons).unwrap_or_default();
+        failures.extend(of_part);
+        Ok(Self {
+            check,
+            failures,
+            warnings,
+        })
+    }
+}
+
 /// The page of a judged motion, beside the core's.
 fn page(
     arguments: &Arguments,
@@ -222,7 +299,7 @@ fn page(
     job: &Job,
     samples: &Samples,
     (judged, own): (&Judged, Option<&OwnRun>),
-    failures: &[String],
+    found: &Found,
 ) -> Result<Option<PathBuf>> {
     if wanted.is_none() {
         return Ok(None);
@@ -236,8 +313,8 @@ fn page(
         .file_name()
         .unwrap_or(arguments.motion.as_os_str());
     let figures = rows().into_iter().map(|(name, unit, figure)| {
-        let given = format!("{:.6}", figure(judged));
-        let own = own.map_or_else(String::new, |own| format!(" | {:.6}", figure(&own.judged)));
+        let given = cell(figure(judged));
+        let own = own.map_or_else(String::new, |own| format!(" | {}", cell(figure(&own.judged))));
         Figure {
             what: format!("{name}, {unit}"),
             value: format!("{given}{own}"),
@@ -252,6 +329,7 @@ fn page(
         };
         (number, line.iter().map(place).collect())
     };
+    let highest: Vec<FieldPoint> = judged.field.highest.into_iter().collect();
     let mut marks = reach_words::marks(job, &judged.reach);
     let mut mark = |what, at: &FieldPoint| {
         marks.push(Mark {
@@ -261,18 +339,16 @@ fn page(
         });
     };
     if let Some(lowest) = judged.violating_gouge(arguments.path_tolerance_mm(job)) {
-        mark(format!("gouge {:.4} mm", judged.gouge_mm()), lowest);
+        mark(format!("gouge {:.4} mm", -lowest.height_mm), lowest);
     }
     if let Some(highest) = judged.violating_scallop(job) {
         mark(format!("scallop {:.5} mm", highest.height_mm), highest);
     }
+    marks.extend(found.check.iter().flat_map(part_words::marks));
+    let fault = own.and_then(|own| own.fault.as_ref()).map(partial);
     let remarks = Remarks {
-        failures: failures.to_vec(),
-        warnings: own
-            .and_then(|own| own.fault.as_ref())
-            .map(partial)
-            .into_iter()
-            .collect(),
+        failures: found.failures.clone(),
+        warnings: fault.into_iter().chain(found.warnings.iter().cloned()).collect(),
         verified: true,
         figures: figures.collect(),
         scallops: Some(Scallops {
@@ -280,7 +356,7 @@ fn page(
             measurement_error_mm: SCALLOP_SLACK * job.scallop_mm,
             // With the highest place, which was searched between the lines.
             ridges: (0..)
-                .zip(judged.field_lines.iter().chain([&vec![*judged.highest()]]))
+                .zip(judged.field_lines.iter().chain([&highest]))
                 .map(line)
                 .collect(),
             anywhere: true,
@@ -300,8 +376,8 @@ fn survey(judged: &Judged) -> SurveyResult {
     report.passes = judged.stretches;
     report.cc_length_mm = judged.contact_length_mm;
     report.complete = true;
-    report.position_nm.max = NM_PER_MM * judged.path_error_mm.value.abs();
-    report.ripple_pct.max = judged.feed.ripple_max_pct;
+    report.position_nm.max = NM_PER_MM * path_error_mm(judged).unwrap_or(0.0);
+    report.ripple_pct.max = judged.feed.ripple_max_pct.unwrap_or(0.0);
     SurveyResult {
         samples: judged.samples as u64,
         passes: judged.stretches,
@@ -323,8 +399,12 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let progress: &dyn Progress = &bar;
     let mut samples = Samples::new();
     let mut keep = |sample: &PassSample, check: &SampleCheck| samples.push((*sample, *check));
-    let each = wanted.map(|_| &mut keep as &mut SampleObserver<'_>);
-    let theirs = judge(&job, &oracle, &given.centres_mm, each, progress);
+    let is_kept = wanted.is_some() || job.origin.reach().is_some();
+    let each = is_kept.then_some(&mut keep as &mut SampleObserver<'_>);
+    let mut theirs = judge(&job, &oracle, &given.centres_mm, each, progress);
+    if given.is_program {
+        theirs = theirs.of_program();
+    }
     let own = if arguments.alone {
         None
     } else {
@@ -334,20 +414,15 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
     };
     bar.clear();
     let core_fault = own.as_ref().and_then(|own| own.fault.as_ref());
-    let failures = theirs.failures(&job, arguments.path_tolerance_mm(&job));
-    let page = page(
-        arguments,
-        wanted,
-        &job,
-        &samples,
-        (&theirs, own.as_ref()),
-        &failures,
-    )?;
+    let found = Found::new(arguments, &job, &theirs, &samples)?;
+    let passed = found.failures.is_empty();
+    let page = page(arguments, wanted, &job, &samples, (&theirs, own.as_ref()), &found)?;
     if arguments.json {
         let value = json!({
             "job": arguments.job.display().to_string(), "motion": arguments.motion.display().to_string(), "period_s": given.period_s,
             "given": object(&job, &theirs), "core": own.as_ref().map(|own| object(&own_job, &own.judged)),
-            "core_fault": core_fault.map(fault_json), "failures": failures, "passed": failures.is_empty(),
+            "core_fault": core_fault.map(fault_json), "part": found.check.as_ref().map(|check| part_words::json(&job, check)),
+            "failures": found.failures, "warnings": found.warnings, "passed": passed,
         });
         say!("{value}");
     } else {
@@ -360,19 +435,28 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
             theirs.field.points
         );
         print(&theirs, own.as_ref().map(|own| &own.judged));
+        if given.is_program {
+            say!("  acceleration and jerk are those of the machine that runs the program: not judged");
+        }
         if let Some(fault) = core_fault {
             say!("  {}", partial(fault));
         }
         reach_words::print(&job, &theirs.reach);
-        for failure in &failures {
+        if let Some(check) = &found.check {
+            part_words::print(&job, check);
+        }
+        for failure in &found.failures {
             say!("  FAIL {failure}");
+        }
+        for warning in &found.warnings {
+            say!("  warning: {warning}");
         }
         if let Some(page) = page {
             say!("  report {}", page.display());
         }
-        say!("  {}", if failures.is_empty() { "passed" } else { "FAILED" });
+        say!("  {}", if passed { "passed" } else { "FAILED" });
     }
-    if failures.is_empty() {
+    if passed {
         Ok(())
     } else {
         Err(Failure::Failed(None))

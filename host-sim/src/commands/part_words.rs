@@ -8,6 +8,20 @@ use serde_json::{Value, json};
 use super::out::say;
 use super::region_words;
 
+/// Reasons against the job, and warnings. Faces of the part that are not known are the former unless they are accepted.
+pub(super) fn reasons(check: &PartCheck, are_unknown_accepted: bool) -> (Vec<String>, Vec<String>) {
+    let (mut failures, mut warnings) = (check.failures.clone(), Vec::new());
+    match check.unknown_faces() {
+        Some(what) if are_unknown_accepted => warnings.push(what),
+        Some(what) => failures.push(format!(
+            "{what}; repair them in the CAD system (the header of the job names them), or look at them and give --accept-unknown-faces"
+        )),
+        None => {}
+    }
+    warnings.extend(check.warnings.iter().cloned());
+    (failures, warnings)
+}
+
 /// Where the tool enters the part.
 pub(super) fn marks(check: &PartCheck) -> Vec<Mark> {
     // Links are known by their places alone.

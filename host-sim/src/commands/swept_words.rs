@@ -7,8 +7,9 @@ use serde_json::{Map, Value, json};
 use job::Job;
 use job::units::S_PER_MIN;
 use machine::prepare::Prepared;
+use oracle::{AccuracyReport, ErrorStatistics};
 use verify::motion::limits::{ORDERS, Peak, Peaks};
-use verify::swept::{ConcaveRadius, MISSED_RADII, SweptResult};
+use verify::swept::{ConcaveRadius, FieldPoint, MISSED_RADII, SweptResult};
 use verify::{Verdict, survey};
 
 /// Capacity of the board for surface data, bytes.
@@ -37,14 +38,14 @@ pub(super) fn json(
         json!({ "radius_mm": concave.radius_mm, "u": concave.u, "v": concave.v, "place_mm": concave.point_mm.to_array() })
     });
     let value = json!({
-        "position_error_max_nm": report.position_nm.max.abs(),
-        "position_error_rms_nm": report.position_nm.rms(),
-        "normal_error_max_rad": report.normal_rad.max.abs(),
-        "ripple_max_pct": report.ripple_pct.max.abs(),
-        "interval_error_max": report.interval.max.abs(),
+        "position_error_max_nm": report.position_nm.largest(),
+        "position_error_rms_nm": report.position_nm.measured().map(ErrorStatistics::rms),
+        "normal_error_max_rad": report.normal_rad.largest(),
+        "ripple_max_pct": report.ripple_pct.largest(),
+        "interval_error_max": report.interval.largest(),
         "passes": survey.passes,
         "samples": survey.samples,
-        "fit_max": report.fit.max,
+        "fit_max": report.fit.largest(),
         "scallop_limit_mm": job.scallop_mm,
         "scallop_max_mm": null_unless(measured, json!(most.height_mm)),
         "scallop_mean_mm": null_unless(measured, json!(found.scallop_mean_mm)),
@@ -57,9 +58,9 @@ pub(super) fn json(
         "region_heights": found.region.map(|region| json!({
             "area_mm2": region.area_mm2, "served_share": region.served_share, "ridges_share": region.ridges_share, "places": region.places,
             "places_a_step_over": region.places_a_step_over,
-            "highest_mm": region.highest.height_mm,
-            "highest_at": { "u": region.highest.uv[0], "v": region.highest.uv[1], "place_mm": region.highest.point_mm.to_array() },
-            "highest_beside_mm": region.highest_beside.height_mm, "above_beside_share": region.above_share,
+            "highest_mm": region.highest.map(|at| at.height_mm),
+            "highest_at": region.highest.map(|at| json!({ "u": at.uv[0], "v": at.uv[1], "place_mm": at.point_mm.to_array() })),
+            "highest_beside_mm": region.highest_beside.map(|at| at.height_mm), "above_beside_share": region.above_share,
         })),
         "gouge_max_mm": null_unless(found.gouge_verdict != Verdict::Unknown, json!(found.gouge_max_mm())),
         "gouge_floor_mm": found.gouge_floor_mm,
@@ -82,7 +83,7 @@ pub(super) fn json(
         "data_bytes": prepared.data_bytes(),
         "data_bytes_max": STORE_BYTES,
         "stations": found.stations,
-        "not_measured": not_measured(job, found, axes),
+        "not_measured": not_measured(job, report, found, axes),
     });
     match value {
         Value::Object(map) => map,
@@ -91,7 +92,23 @@ pub(super) fn json(
 }
 
 /// The keys of the figures that could not be measured.
-fn not_measured(job: &Job, found: &SweptResult, [velocity, acceleration, jerk]: &Peaks) -> Vec<&'static str> {
+fn not_measured(
+    job: &Job,
+    report: &AccuracyReport,
+    found: &SweptResult,
+    [velocity, acceleration, jerk]: &Peaks,
+) -> Vec<&'static str> {
+    // Where nothing counts for an interval, none has an error.
+    let of_samples = [
+        ("position_error_max_nm", &report.position_nm),
+        ("position_error_rms_nm", &report.position_nm),
+        ("normal_error_max_rad", &report.normal_rad),
+        ("ripple_max_pct", &report.ripple_pct),
+        ("fit_max", &report.fit),
+    ];
+    let missing = of_samples
+        .into_iter()
+        .filter(|(_, errors)| errors.measured().is_none());
     let figures = [
         ("scallop_max_mm", found.scallop_verdict),
         ("gouge_max_mm", found.gouge_verdict),
@@ -102,7 +119,8 @@ fn not_measured(job: &Job, found: &SweptResult, [velocity, acceleration, jerk]: 
     let unknown = figures.into_iter().filter(|(key, verdict)| {
         *verdict == Verdict::Unknown && !(*key == "scallop_max_mm" && found.has_no_gap(job))
     });
-    unknown.map(|(key, _)| key).collect()
+    let missing = missing.map(|(key, _)| key);
+    missing.chain(unknown.map(|(key, _)| key)).collect()
 }
 
 /// Shares of the axis limits; null without limits, and where the positions do not tell. `base_s`: over which they are judged;
@@ -215,10 +233,7 @@ pub(super) fn print(
     if job.overrun_mm > 0.0 {
         row(
             "turns",
-            &format!(
-                "up to {} mm beyond the boundary: what stands there is not known to the job, and not checked",
-                job.overrun_mm
-            ),
+            &format!("up to {} mm beyond the boundary: {}", job.overrun_mm, beside(job)),
         );
     }
     row(
@@ -234,6 +249,27 @@ pub(super) fn print(
             100.0 * ratio(bytes, STORE_BYTES)
         ),
     );
+}
+
+/// What of that which stands beside the surface is checked.
+fn beside(job: &Job) -> String {
+    let setup = &job.setup;
+    let named: Vec<&str> = [
+        (job.origin.part().is_some(), "[part]"),
+        (setup.stock.is_some(), "[stock]"),
+        (!setup.fixtures.is_empty(), "[[fixture]]"),
+    ]
+    .into_iter()
+    .filter_map(|(is_named, name)| is_named.then_some(name))
+    .collect();
+    if named.is_empty() {
+        "what stands there is not known to the job, and not checked".to_owned()
+    } else {
+        format!(
+            "of what stands there {} is checked, nothing else",
+            named.join(", ")
+        )
+    }
 }
 
 fn scallop(job: &Job, found: &SweptResult) {
@@ -291,32 +327,36 @@ fn region(job: &Job, found: &SweptResult) {
     let Some(region) = &found.region else {
         return;
     };
-    let height = |mm: f64| {
-        if mm >= MISSED_RADII * job.radius_mm {
+    let height = |at: &FieldPoint| {
+        if at.height_mm >= MISSED_RADII * job.radius_mm {
             "uncut".to_owned()
         } else {
-            format!("{:.4} um", um(mm))
+            format!("{:.4} um", um(at.height_mm))
         }
     };
     let percent = |share: f64| 100.0 * share;
-    row(
+    let verdict = match region.highest {
+        Some(_) => mark(found.region_verdict),
+        None => "    ",
+    };
+    let highest = region.highest.as_ref().map_or_else(String::new, |highest| {
+        let [u, v] = highest.uv;
+        format!(": highest {} at u = {u:.6}, v = {v:.6}", height(highest))
+    });
+    say!(
+        "  {verdict} {:<22} {:.1} % of its {:.1} mm2 are half a step-over or more from its boundary{highest}; ridges with the +- above are in {:.1} %",
         "region",
-        &format!(
-            "{:.1} % of its {:.1} mm2 are half a step-over or more from its boundary: highest {} at u = {:.6}, v = {:.6}; ridges with the +- above are in {:.1} %",
-            percent(region.served_share),
-            region.area_mm2,
-            height(region.highest.height_mm),
-            region.highest.uv[0],
-            region.highest.uv[1],
-            percent(region.ridges_share)
-        ),
+        percent(region.served_share),
+        region.area_mm2,
+        percent(region.ridges_share)
     );
+    let beside = region.highest_beside.as_ref();
     row(
         "",
         &format!(
             "nearer to the boundary {:.1} % of the region are above the limit, up to {}; {} places",
             percent(region.above_share),
-            height(region.highest_beside.height_mm),
+            beside.map_or_else(|| "-".to_owned(), height),
             region.places
         ),
     );
@@ -392,6 +432,20 @@ fn peaks(axes: &Peaks) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn turns_are_checked_against_what_the_job_names() {
+        let plate = include_str!("../../../jobs/plate_machine.toml");
+        let of = |rest: &str| beside(&job_file::parse("plate.toml", &format!("{plate}\n{rest}")).unwrap());
+        assert!(of("").contains("not checked"));
+        let named = of(
+            "[stock]\nbox_mm = [[0, 1], [0, 1], [0, 1]]\n[[fixture]]\nbox_mm = [[0, 1], [0, 1], [0, 1]]\n",
+        );
+        assert_eq!(
+            named,
+            "of what stands there [stock], [[fixture]] is checked, nothing else"
+        );
+    }
 
     #[test]
     fn given_lengths_have_the_digits_that_were_given() {

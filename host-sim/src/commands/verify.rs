@@ -1,5 +1,6 @@
 //! `verify`: checks every sample of a job against the independent oracle.
 
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -161,6 +162,13 @@ fn marks(job: &Job, timed: &TimedRun, measured: &RunMeasurements) -> Vec<Mark> {
             tick: None,
         });
     }
+    if let Some(highest) = swept.violating_place() {
+        marks.push(Mark {
+            what: format!("{:.5} mm left in the region", highest.height_mm),
+            place_mm: highest.point_mm,
+            tick: None,
+        });
+    }
     marks.extend(reach_words::marks(job, &measured.reach));
     marks
 }
@@ -263,6 +271,25 @@ fn folder_of(job: &Path) -> String {
     }
 }
 
+/// Refuses jobs whose reports would be in one folder.
+fn have_own_folders<'a>(jobs: impl Iterator<Item = &'a Path>) -> Result<()> {
+    let mut folders: HashMap<String, &Path> = HashMap::new();
+    for job in jobs {
+        let folder = folder_of(job);
+        if let Some(other) = folders.insert(folder.clone(), job) {
+            return Err(Failure::input(
+                format!(
+                    "the reports of {} and {} would both be in the folder {folder}",
+                    other.display(),
+                    job.display()
+                ),
+                "verify them one after the other, each with a folder of its own for --report",
+            ));
+        }
+    }
+    Ok(())
+}
+
 /// Verifies the jobs, prints the figures, and fails if any job does; with the exit code of bad input if a job cannot be read.
 pub(super) fn command(arguments: &Arguments) -> Result<()> {
     let mut jobs = Vec::new();
@@ -270,6 +297,9 @@ pub(super) fn command(arguments: &Arguments) -> Result<()> {
         let faces = job_file::jobs_of(path)?;
         let stops = stops(&faces, |face| load(arguments, face).ok())?;
         jobs.extend(faces.into_iter().zip(stops));
+    }
+    if arguments.report.is_some() {
+        have_own_folders(jobs.iter().map(|(job, _)| job.as_path()))?;
     }
     if let [(job, stop)] = jobs.as_slice() {
         let (passed, value) = verify_job(arguments, job, *stop, arguments.report.as_deref())?;
@@ -352,24 +382,6 @@ fn load(arguments: &Arguments, path: &Path) -> Result<(Job, Prepared)> {
     home::load(path, profile.as_ref(), arguments.placed.origin, None)
 }
 
-/// Faces of the part that are not known: a reason against the job unless they are accepted.
-fn unknown_faces(check: &PartCheck, is_accepted: bool, found: &mut Verification) {
-    if check.unknown == 0 {
-        return;
-    }
-    let what = format!(
-        "{} faces of the part are not known: whether the tool cuts them is not checked",
-        check.unknown
-    );
-    if is_accepted {
-        found.warnings.push(what);
-    } else {
-        found.failures.push(format!(
-            "{what}; repair them in the CAD system (the header of the job names them), or look at them and give --accept-unknown-faces"
-        ));
-    }
-}
-
 /// The job of passes of constant scallop height with straight ones, as it would be run.
 fn straight(job: &Job, stop: Stop) -> Option<(Job, Prepared)> {
     let job = Job {
@@ -425,13 +437,13 @@ fn verify_job(
     bar.clear();
     let mut found = found?;
     let check = match &centres {
-        Some(centres) => part::check_run(&job, centres, &found.measured.links_mm)?,
+        Some(centres) => part::check_run(&job, centres, &found.measured.links_mm, 0.0)?,
         None => None,
     };
     if let Some(check) = &check {
-        found.failures.extend(check.failures.iter().cloned());
-        unknown_faces(check, arguments.accept_unknown_faces, &mut found);
-        found.warnings.extend(check.warnings.iter().cloned());
+        let (failures, warnings) = part_words::reasons(check, arguments.accept_unknown_faces);
+        found.failures.extend(failures);
+        found.warnings.extend(warnings);
     }
     let RunMeasurements { findings, swept, .. } = &found.measured;
     let mut remarks = Remarks {
@@ -466,6 +478,50 @@ fn verify_job(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A place of the region that is too high does not make the ridges so: it has its own figures and its own mark.
+    #[test]
+    fn a_region_and_its_ridges_have_their_own_figures() {
+        let text = include_str!("../../../jobs/region.toml");
+        let mut job = job_file::parse("region.toml", text).unwrap();
+        job.scallop_mm = 0.2;
+        let (job, prepared) = settled(job).unwrap();
+        let timed = timed(&job, &prepared).unwrap();
+        let requirements = Requirements {
+            with_optimum: false,
+            swept: swept::Requirements::default(),
+            straight: None,
+        };
+        let mut found = verify_run(&job, &prepared, &timed, None, &requirements, &()).unwrap();
+        assert!(found.failures.is_empty(), "{:?}", found.failures);
+        let highest = found.measured.swept.region.unwrap().highest.unwrap();
+        found.measured.swept.region_verdict = Verdict::Violated;
+        let [mark] = &marks(&job, &timed, &found.measured)[..] else {
+            panic!("one mark: the region's");
+        };
+        assert_eq!(mark.place_mm, highest.point_mm);
+        assert!(mark.what.contains("in the region"), "{}", mark.what);
+        found.measured.swept.scallop_verdict = Verdict::Unknown;
+        let json = json(&job, &prepared, &found);
+        assert_eq!(
+            (&json["scallop_max_mm"], &json["scallop_at"]),
+            (&Value::Null, &Value::Null)
+        );
+        assert_eq!(json["region_heights"]["highest_mm"], highest.height_mm);
+    }
+
+    #[test]
+    fn no_two_reports_share_a_folder() {
+        let jobs = |names: &[&'static str]| have_own_folders(names.iter().map(Path::new));
+        assert!(jobs(&["a/part.toml#1", "a/part.toml#2", "a/plate.toml"]).is_ok());
+        for same in [
+            ["a/part.toml", "b/part.toml"],
+            ["part.toml#34", "part-34.toml"],
+            ["a.toml", "a.toml"],
+        ] {
+            assert!(jobs(&same).is_err(), "{same:?}");
+        }
+    }
 
     #[test]
     fn each_face_of_a_part_has_a_folder() {

@@ -15,6 +15,8 @@ pub(crate) struct Motion {
     pub period_s: f64,
     /// Positions of the ball's centre, mm.
     pub centres_mm: Vec<DVec3>,
+    /// Of a program: without acceleration of its own.
+    pub is_program: bool,
 }
 
 /// Reason for which a motion cannot be read.

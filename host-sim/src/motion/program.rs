@@ -411,7 +411,11 @@ fn sampled(path: &Path, moves: &[Move], job: &Job) -> Result<Motion, MotionError
     if let Some(last) = moves.last().filter(|_| since_s > ON_PERIOD * period_s) {
         centres_mm.push(last.to);
     }
-    Ok(Motion { period_s, centres_mm })
+    Ok(Motion {
+        period_s,
+        centres_mm,
+        is_program: true,
+    })
 }
 
 #[cfg(test)]

@@ -57,6 +57,7 @@ pub(super) fn read(path: &Path) -> Result<Motion, MotionError> {
     Ok(Motion {
         period_s: period_s(path, &times)?,
         centres_mm,
+        is_program: false,
     })
 }
 

@@ -55,7 +55,10 @@ fn json_has_the_names_that_scripts_rely_on() {
     has(&reported, EXPORT, "export");
     has(&json(folder.path(), "explain R1 --json"), EXPLAIN, "explain");
     assert_eq!(
-        json(folder.path(), "explain --json").as_array().unwrap().len(),
+        json(folder.path(), "explain --json")["entries"]
+            .as_array()
+            .unwrap()
+            .len(),
         explain::entries().len()
     );
     has(&json(folder.path(), "new -o n.toml --json"), "job:s", "new");

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::{err, folder_with, json, out, run};
+use super::{err, folder_with, json, out, run, sample};
 
 /// The core's own samples, judged as anybody's: as `verify` finds them. Moved by 4 um they fail, with that path error.
 #[test]
@@ -90,6 +90,32 @@ fn judge_takes_programs() {
     assert!(error > 0.002 && error <= 0.0052, "{error}");
     let [least, mean] = ["min", "mean"].map(|key| reported["given"]["feed_mm_s"][key].as_f64().unwrap());
     assert!(least < mean && (mean - 10.0).abs() < 0.1, "{mean}");
+    // The program of a job with axis limits: its corners are the machine's to round, so velocity alone is judged, and it passes.
+    // Its chords are within 3 um above the surface, which the passes leave room for.
+    let machine = folder_with(
+        "plate_machine",
+        &[
+            ("scallop_mm = 0.05", "scallop_mm = 0.045"),
+            ("chord_mm = 0.005", "chord_mm = 0.003"),
+        ],
+    );
+    let exported = run(machine.path(), "export job.toml --format linuxcnc -o posted.ngc");
+    assert!(exported.status.success(), "{}", err(&exported));
+    std::fs::write(machine.path().join("job.toml"), sample("plate_machine")).unwrap();
+    let reported = json(machine.path(), "judge job.toml posted.ngc --alone --json");
+    let (given, null) = (&reported["given"], Value::Null);
+    assert!(given["limits"]["velocity"].as_f64().unwrap() <= 1.01, "{given}");
+    assert_eq!(
+        (&given["limits"]["acceleration"], &given["axes"]["jerk_mm_s3"]),
+        (&null, &null)
+    );
+    let missing = given["not_measured"].to_string();
+    assert!(
+        missing.contains("limits.acceleration") && missing.contains("axes.jerk_mm_s3"),
+        "{missing}"
+    );
+    let text = out(&run(machine.path(), "judge job.toml posted.ngc --alone"));
+    assert!(text.contains("not judged"), "{text}");
     std::fs::write(folder.path().join("bad.ngc"), "G1 X1 Y2 F0 Q\n").unwrap();
     let refused = run(folder.path(), "judge job.toml bad.ngc --json");
     assert_eq!(refused.status.code(), Some(2), "{}", out(&refused));

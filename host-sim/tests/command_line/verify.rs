@@ -48,12 +48,21 @@ fn a_run_without_a_sample_meets_nothing() {
         (&found["passed"], &found["gouge_max_mm"]),
         (&false.into(), &Value::Null)
     );
-    assert!(
-        found["not_measured"]
-            .as_array()
-            .unwrap()
-            .contains(&"gouge_max_mm".into())
-    );
+    let missing = found["not_measured"].as_array().unwrap();
+    assert!(missing.contains(&"gouge_max_mm".into()));
+    for key in [
+        "position_error_max_nm",
+        "position_error_rms_nm",
+        "normal_error_max_rad",
+        "ripple_max_pct",
+        "fit_max",
+    ] {
+        assert!(
+            found[key].is_null() && missing.contains(&key.into()),
+            "{key}: {found}"
+        );
+    }
+    assert!(found["interval_error_max"].is_null());
     let reported = out(&run(folder.path(), "verify job.toml"));
     assert!(
         reported.contains("not measured: the run has no sample") && !reported.contains("none deeper"),

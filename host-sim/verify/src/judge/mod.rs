@@ -21,10 +21,10 @@ use job::Job;
 use job::units::NM_PER_MM;
 use oracle::Oracle;
 
-use crate::motion::{PeakMeter, Peaks};
+use crate::motion::{Peak, PeakMeter};
 use crate::reach::{self, Motion, ReachResult};
 use crate::survey::SampleObserver;
-use crate::swept::{FieldPoint, HeightField, Progress, ToolPath, height_field};
+use crate::swept::{AxisTravel, FieldPoint, HeightField, Progress, ToolPath, height_field};
 
 use stretches::Stretches;
 
@@ -42,14 +42,14 @@ const JUMP_STEPS: f64 = 3.0;
 /// Statistics of the contact's feed, mm/s.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ContactFeed {
-    /// Least and largest, over all periods in contact.
-    pub range: [f64; 2],
-    /// Mean over time in contact.
-    pub mean: f64,
-    /// Root mean square deviation from the programmed feed, %, over periods at 90 % of it or more, 50 periods from slower ones.
-    pub ripple_rms_pct: f64,
+    /// Least and largest, over all periods in contact; `None` without one.
+    pub range: Option<[f64; 2]>,
+    /// Mean over time in contact; `None` likewise.
+    pub mean: Option<f64>,
+    /// Root mean square deviation from the programmed feed, %, over periods at 90 % of it or more, 50 periods from slower ones; `None` without one.
+    pub ripple_rms_pct: Option<f64>,
     /// Largest such deviation, %.
-    pub ripple_max_pct: f64,
+    pub ripple_max_pct: Option<f64>,
 }
 
 /// A place on the motion.
@@ -77,14 +77,14 @@ pub struct Judged {
     /// The contact's feed.
     pub feed: ContactFeed,
     /// Largest distance of the centre from the exact offset surface while in contact, mm; below zero towards the surface. Where the tool comes
-    /// to the surface or leaves it, the distance does not count: what is then left of the material is in the heights.
-    pub path_error_mm: MotionPoint,
+    /// to the surface or leaves it, the distance does not count: what is then left of the material is in the heights. `None` without contact.
+    pub path_error_mm: Option<MotionPoint>,
     /// Root mean square of that distance, mm.
-    pub path_error_rms_mm: f64,
+    pub path_error_rms_mm: Option<f64>,
     /// Samples whose contact is on the ball's upper half (spindle along z).
     pub above_equator: usize,
-    /// The steepest contact on the upper half: z of the tool normal.
-    pub steepest: MotionPoint,
+    /// The steepest contact: z of the tool normal; `None` without contact.
+    pub steepest: Option<MotionPoint>,
     /// Heights left on the surface.
     pub field: HeightField,
     /// Heights left along lines of the surface, thinned, for a picture.
@@ -97,21 +97,30 @@ pub struct Judged {
     pub contact_length_mm: f64,
     /// Number of stretches in contact.
     pub stretches: u32,
-    /// Use of the axis limits.
-    pub axes: Peaks,
+    /// Travel of the axes, over all samples.
+    pub travel: AxisTravel,
+    /// Use of the limits of velocity, acceleration and jerk; `None`: it is not the motion's own ([`Judged::of_program`]).
+    pub axes: [Option<Peak>; 3],
 }
 
 impl Judged {
-    /// The deepest gouge, mm: a ball below the surface.
+    /// The figures of a program's positions: each move at its feed from its first period to its last. Acceleration and jerk are the machine's that runs the program.
     #[must_use]
-    pub fn gouge_mm(&self) -> f64 {
-        (-self.field.lowest.height_mm).max(0.0)
+    pub fn of_program(mut self) -> Self {
+        [_, self.axes[1], self.axes[2]] = [None; 3];
+        self
     }
 
-    /// The highest place that is left.
+    /// The deepest gouge, mm: a ball below the surface. `None` where no place is measured.
     #[must_use]
-    pub fn highest(&self) -> &FieldPoint {
-        &self.field.highest
+    pub fn gouge_mm(&self) -> Option<f64> {
+        Some((-self.field.lowest?.height_mm).max(0.0))
+    }
+
+    /// Height of the highest place that is left, mm; `None` likewise.
+    #[must_use]
+    pub fn highest_mm(&self) -> Option<f64> {
+        Some(self.field.highest?.height_mm)
     }
 }
 
@@ -132,7 +141,7 @@ pub fn judge(
     let contact_mm = (CONTACT_SHARE * oracle.radius_mm).max(CONTACT_MIN_MM);
     let mut state = Contacts::new(job.feed_mm_s(), period_s);
     let mut last: Option<NearestPoint> = None;
-    let mut motion = Motion::default();
+    let mut motion = Ways::default();
     let mut stretches = Stretches::new(each, job, oracle.radius_mm);
     progress.begin("contacts", centres_mm.len() as u64);
     for (index, centre_mm) in centres_mm.iter().enumerate() {
@@ -156,15 +165,17 @@ pub fn judge(
         } else {
             state.leave();
         }
-        motion.add(cl_nm, touches, jumps && !job.machine.has_limits());
         // Without limits a motion may leave out its links.
-        if jumps && !job.machine.has_limits() {
+        let is_left_out = jumps && !job.machine.has_limits();
+        motion.add(cl_nm, touches, jumps, is_left_out);
+        if is_left_out {
             meter.discontinuity();
         }
         meter.add(index as u64, cl_nm);
         last = touches.then_some(nearest);
         progress.done(1);
     }
+    let motion = motion.finish();
     let (field, field_lines) = height_field(oracle, &path, progress);
     let stretches = stretches.finish();
     let around = Around {
@@ -173,10 +184,39 @@ pub fn judge(
         reach: reach::measure(job, oracle, &motion, &stretches.contact, progress),
         links_mm: motion.links(),
         stretches: stretches.count,
+        travel: AxisTravel::new(extent_mm(centres_mm), &job.machine),
     };
     #[allow(clippy::cast_precision_loss, reason = "below 2^53")]
     let time_s = centres_mm.len() as f64 * period_s;
-    state.finish(centres_mm.len(), time_s, around, meter.peaks())
+    state.finish(centres_mm.len(), time_s, around, meter.peaks().map(Some))
+}
+
+/// The motion with its ways off the surface. What is between a sample in contact and one that is not, or one to which the contact jumps, is no pass: such a way begins with the
+/// sample in contact.
+#[derive(Default)]
+struct Ways {
+    motion: Motion,
+    /// The last sample: position, whether it is in contact, whether nothing is between it and the one before.
+    last: Option<([i32; 3], bool, bool)>,
+}
+
+impl Ways {
+    fn add(&mut self, cl_nm: [i32; 3], touches: bool, jumps: bool, is_left_out: bool) {
+        self.flush(touches && (is_left_out || !jumps));
+        self.last = Some((cl_nm, touches, is_left_out));
+    }
+
+    /// Adds the last sample; `goes_on`: the contact does.
+    fn flush(&mut self, goes_on: bool) {
+        if let Some((cl_nm, touches, is_left_out)) = self.last.take() {
+            self.motion.add(cl_nm, touches && goes_on, is_left_out);
+        }
+    }
+
+    fn finish(mut self) -> Motion {
+        self.flush(true);
+        self.motion
+    }
 }
 
 /// Whether the centre is on the tool's side of the surface.
@@ -193,6 +233,14 @@ struct Around {
     reach: ReachResult,
     links_mm: Vec<Vec<DVec3>>,
     stretches: u32,
+    travel: AxisTravel,
+}
+
+/// Least and greatest position of each axis, mm.
+fn extent_mm(centres_mm: &[DVec3]) -> Option<[[f64; 2]; 3]> {
+    let low = centres_mm.iter().copied().reduce(DVec3::min)?;
+    let high = centres_mm.iter().copied().reduce(DVec3::max)?;
+    Some(std::array::from_fn(|axis| [low[axis], high[axis]]))
 }
 
 /// A sample in contact.
@@ -217,11 +265,11 @@ struct Contacts {
     speeds: Vec<Option<f64>>,
     /// Errors of the present stretch.
     stretch: Vec<MotionPoint>,
-    error: MotionPoint,
+    error: Option<MotionPoint>,
     error_squares: f64,
     errors: usize,
     above: usize,
-    steepest: MotionPoint,
+    steepest: Option<MotionPoint>,
 }
 
 impl Contacts {
@@ -235,14 +283,11 @@ impl Contacts {
             jumps: 0,
             speeds: Vec::new(),
             stretch: Vec::new(),
-            error: MotionPoint::default(),
+            error: None,
             error_squares: 0.0,
             errors: 0,
             above: 0,
-            steepest: MotionPoint {
-                value: 1.0,
-                ..MotionPoint::default()
-            },
+            steepest: None,
         }
     }
 
@@ -262,8 +307,8 @@ impl Contacts {
         self.stretch.push(point(nearest.distance_mm - oracle.radius_mm));
         let up = (centre_mm - nearest.point_mm).z / nearest.distance_mm.max(f64::MIN_POSITIVE);
         self.above += usize::from(up < 0.0);
-        if up < self.steepest.value {
-            self.steepest = point(up);
+        if self.steepest.is_none_or(|steepest| up < steepest.value) {
+            self.steepest = Some(point(up));
         }
         self.step_mm = None;
         let Some(before) = before else {
@@ -292,15 +337,15 @@ impl Contacts {
         for error in counted {
             self.errors += 1;
             self.error_squares += error.value * error.value;
-            if error.value.abs() > self.error.value.abs() {
-                self.error = *error;
+            if self.error.is_none_or(|most| error.value.abs() > most.value.abs()) {
+                self.error = Some(*error);
             }
         }
         self.speeds.push(None);
     }
 
-    /// Largest and mean square deviation from the feed, %, away from ramps.
-    fn ripple_pct(&self) -> [f64; 2] {
+    /// Largest and mean square deviation from the feed, %, away from ramps; `None` where all is a ramp.
+    fn ripple_pct(&self) -> Option<[f64; 2]> {
         let slow = |speed: &Option<f64>| speed.is_none_or(|speed| speed < AT_FEED * self.feed_mm_s);
         // Periods since the last slow one, in both directions.
         let mut since = vec![0_usize; self.speeds.len()];
@@ -319,30 +364,31 @@ impl Contacts {
                 count += 1;
             }
         }
-        [most, per(squares, count)]
+        Some([most, per(squares, count)?])
     }
 
-    fn finish(mut self, samples: usize, time_s: f64, around: Around, axes: Peaks) -> Judged {
+    fn finish(mut self, samples: usize, time_s: f64, around: Around, axes: [Option<Peak>; 3]) -> Judged {
         self.leave();
         let speeds = || self.speeds.iter().flatten().copied();
-        let [ripple_max_pct, mean_square] = self.ripple_pct();
-        let least = speeds().fold(f64::INFINITY, f64::min);
+        let ripple = self.ripple_pct();
+        let mean = per(speeds().sum(), speeds().count());
+        let range = [
+            speeds().fold(f64::INFINITY, f64::min),
+            speeds().fold(0.0, f64::max),
+        ];
         Judged {
             samples,
             in_contact: self.count,
             jumps: self.jumps,
             time_s,
             feed: ContactFeed {
-                range: [
-                    if least.is_finite() { least } else { 0.0 },
-                    speeds().fold(0.0, f64::max),
-                ],
-                mean: per(speeds().sum(), speeds().count()),
-                ripple_rms_pct: mean_square.sqrt(),
-                ripple_max_pct,
+                range: mean.map(|_| range),
+                mean,
+                ripple_rms_pct: ripple.map(|[_, mean_square]| mean_square.sqrt()),
+                ripple_max_pct: ripple.map(|[most, _]| most),
             },
             path_error_mm: self.error,
-            path_error_rms_mm: per(self.error_squares, self.errors).sqrt(),
+            path_error_rms_mm: per(self.error_squares, self.errors).map(f64::sqrt),
             above_equator: self.above,
             steepest: self.steepest,
             field: around.field,
@@ -351,14 +397,15 @@ impl Contacts {
             links_mm: around.links_mm,
             contact_length_mm: self.length_mm,
             stretches: around.stretches,
+            travel: around.travel,
             axes,
         }
     }
 }
 
 #[allow(clippy::cast_precision_loss, reason = "below 2^53")]
-fn per(sum: f64, count: usize) -> f64 {
-    sum / count.max(1) as f64
+fn per(sum: f64, count: usize) -> Option<f64> {
+    (count > 0).then(|| sum / count as f64)
 }
 
 /// Length of the contact's way between two points, mm: the chord, and by how much a circle through both with the tangents of the surface
@@ -411,33 +458,46 @@ mod tests {
         centres
     }
 
+    fn error_mm(judged: &Judged) -> f64 {
+        judged.path_error_mm.unwrap().value
+    }
+
+    /// What no sample tells is no figure of 0: a motion that never touches, one below the feed.
+    #[test]
+    fn what_is_not_measured_has_no_figure() {
+        let (job, oracle) = torus(0.05);
+        let away = judge(&job, &oracle, &[DVec3::Z * 100.0; 3], None, &());
+        assert_eq!((away.feed, away.path_error_mm), (ContactFeed::default(), None));
+        assert_eq!((away.path_error_rms_mm, away.steepest), (None, None));
+        let slow: Vec<DVec3> = (0..300).map(|k| centre(5.0, 1e-5 * f64::from(k), 0.0)).collect();
+        let slow = judge(&job, &oracle, &slow, None, &());
+        assert!(
+            slow.feed.mean.is_some() && slow.feed.ripple_max_pct.is_none(),
+            "{:?}",
+            slow.feed
+        );
+    }
+
     #[test]
     fn a_known_motion_has_its_figures() {
         let (job, oracle) = torus(0.05);
         let judged = judge(&job, &oracle, &passes(12, 0.0, 0.02), None, &());
         assert_eq!((judged.in_contact, judged.jumps), (judged.samples, 12));
-        assert!(
-            judged.path_error_mm.value.abs() < 2e-6,
-            "{:?}",
-            judged.path_error_mm
-        );
-        assert!(
-            (judged.feed.ripple_max_pct - 2.0).abs() < 0.01,
-            "{:?}",
-            judged.feed
-        );
-        assert!((judged.feed.ripple_rms_pct - 2.0_f64 / 2.0_f64.sqrt()).abs() < 0.02);
-        assert!((judged.feed.mean - 10.0).abs() < 0.02);
+        assert!(error_mm(&judged).abs() < 2e-6, "{:?}", judged.path_error_mm);
+        let feed = judged.feed;
+        assert!((feed.ripple_max_pct.unwrap() - 2.0).abs() < 0.01, "{feed:?}");
+        assert!((feed.ripple_rms_pct.unwrap() - 2.0_f64 / 2.0_f64.sqrt()).abs() < 0.02);
+        assert!((feed.mean.unwrap() - 10.0).abs() < 0.02);
         // Balls on a circle of 8 - 5 mm inside one of 8 mm: the crest is half-way, 5 degrees from both.
         let (sin, cos) = 5.0_f64.to_radians().sin_cos();
         let crest = 3.0 * cos + (25.0 - (3.0 * sin).powi(2)).sqrt();
         let exact = 8.0 - crest;
         assert!(
-            (judged.highest().height_mm - exact).abs() < 2e-3 * exact,
-            "{} for {exact}",
-            judged.highest().height_mm
+            (judged.highest_mm().unwrap() - exact).abs() < 2e-3 * exact,
+            "{:?} for {exact}",
+            judged.highest_mm()
         );
-        assert!(judged.gouge_mm() < 5e-6 && judged.field.uncut_share == 0.0);
+        assert!(judged.gouge_mm().unwrap() < 5e-6 && judged.field.uncut_share == Some(0.0));
         assert_eq!(judged.above_equator, 0);
     }
 
@@ -445,21 +505,18 @@ mod tests {
     fn a_motion_too_deep_or_too_high_is_seen() {
         let (job, oracle) = torus(0.05);
         let deep = judge(&job, &oracle, &passes(12, -0.004, 0.0), None, &());
-        assert!(
-            (deep.path_error_mm.value + 0.004).abs() < 5e-6,
-            "{:?}",
-            deep.path_error_mm
-        );
-        assert!((deep.gouge_mm() - 0.004).abs() < 5e-6, "{}", deep.gouge_mm());
+        assert!((error_mm(&deep) + 0.004).abs() < 5e-6, "{:?}", deep.path_error_mm);
+        let gouge_mm = deep.gouge_mm().unwrap();
+        assert!((gouge_mm - 0.004).abs() < 5e-6, "{gouge_mm}");
         let high = judge(&job, &oracle, &passes(12, 0.003, 0.0), None, &());
-        assert!((high.path_error_mm.value - 0.003).abs() < 5e-6);
-        assert!(high.gouge_mm() == 0.0 && high.field.mean_mm > 0.003);
+        assert!((error_mm(&high) - 0.003).abs() < 5e-6);
+        assert!(high.gouge_mm() == Some(0.0) && high.field.mean_mm > Some(0.003));
         // Half of the groove is left out.
         let half: Vec<DVec3> = passes(12, 0.0, 0.0)
             .into_iter()
             .filter(|centre| centre.y > centre.x)
             .collect();
-        let uncut = judge(&job, &oracle, &half, None, &()).field.uncut_share;
+        let uncut = judge(&job, &oracle, &half, None, &()).field.uncut_share.unwrap();
         assert!(uncut > 0.3 && uncut < 0.5, "{uncut}");
     }
 
@@ -491,6 +548,89 @@ mod tests {
         assert!(says(&away, 0.01, "never touches the surface"));
     }
 
+    /// A program has no acceleration of its own: every corner of it is above any limit. Its velocity is judged.
+    #[test]
+    fn a_program_is_judged_by_its_velocity() {
+        let (mut job, oracle) = torus(0.05);
+        let mut limits = job::AxisLimits::DEFAULT;
+        job.machine.limits = Some(limits);
+        let centres = passes(12, 0.0, 0.0);
+        let of = |job: &Job| judge(job, &oracle, &centres, None, &());
+        let failures = |judged: Judged, job: &Job| judged.failures(job, 0.01).join("; ");
+        let samples = failures(of(&job), &job);
+        assert!(
+            samples.contains("acceleration") && samples.contains("jerk"),
+            "{samples}"
+        );
+        let program = of(&job).of_program();
+        assert!(program.axes[0].is_some() && program.axes[1..] == [None; 2]);
+        let program = failures(program, &job);
+        assert!(
+            !program.contains("acceleration") && !program.contains("jerk"),
+            "{program}"
+        );
+        limits.velocity_mm_s = [5.0; 3];
+        job.machine.limits = Some(limits);
+        let slow = failures(of(&job).of_program(), &job);
+        assert!(slow.contains("of its velocity limit"), "{slow}");
+    }
+
+    /// The step from the last contact to the first sample off the surface is a way between passes: here from one end of the groove through its flank to the other.
+    #[test]
+    fn a_way_off_the_surface_begins_in_contact() {
+        let (job, oracle) = torus(0.05);
+        let mut centres: Vec<DVec3> = (0..50)
+            .rev()
+            .map(|k| centre(5.0, 2.5e-4 * f64::from(k), 0.0))
+            .collect();
+        let reach = |centres: &[DVec3]| judge(&job, &oracle, centres, None, &()).reach.failures.join("; ");
+        assert_eq!(reach(&centres), "");
+        centres.push(DVec3::new(0.0, 40.0, -2.0));
+        let failures = reach(&centres);
+        assert!(failures.contains("the surface between passes"), "{failures}");
+    }
+
+    /// A region's scallops are those that its passes serve; a gouge counts wherever it is.
+    #[test]
+    fn gouges_beside_a_region_are_seen() {
+        let (mut job, _) = torus(0.05);
+        let [[u0, u1], [v0, v1]] = job.surface.domain();
+        let half = vec![[u0, v0], [u1, v0], [u1, 0.5 * (v0 + v1)], [u0, 0.5 * (v0 + v1)]];
+        job.region = Some(job::Region::new(vec![half]));
+        let oracle = Oracle::new(&job).unwrap();
+        let projector = Projector::new(&oracle);
+        let lowered = |centre: DVec3| {
+            let at = projector.nearest(centre);
+            let [u, v] = at.uv;
+            let depth_mm = if oracle.is_in_region(u, v) { 0.0 } else { 0.004 };
+            centre + (at.point_mm - centre).normalize() * depth_mm
+        };
+        let centres: Vec<DVec3> = passes(12, 0.0, 0.0)
+            .into_iter()
+            .step_by(20)
+            .map(lowered)
+            .collect();
+        let gouge_mm = judge(&job, &oracle, &centres, None, &()).gouge_mm().unwrap();
+        assert!(gouge_mm > 0.0035, "{gouge_mm}");
+    }
+
+    /// The travel counts for every sample, those off the surface too.
+    #[test]
+    fn a_motion_beyond_the_travel_is_no_pass() {
+        let (mut job, oracle) = torus(0.05);
+        job.machine.travel_mm = Some([[-100.0, 100.0], [-100.0, 100.0], [-100.0, 20.0]]);
+        let mut centres = passes(12, 0.0, 0.0);
+        let says = |centres: &[DVec3]| {
+            let failures = judge(&job, &oracle, centres, None, &()).failures(&job, 0.01);
+            failures
+                .iter()
+                .any(|failure| failure.contains("machine.travel_mm"))
+        };
+        assert!(!says(&centres));
+        centres.push(DVec3::new(0.0, 0.0, 21.0));
+        assert!(says(&centres));
+    }
+
     /// A plunge, a way along the groove and a retract: the way alone has an error.
     #[test]
     fn coming_and_leaving_are_no_errors() {
@@ -503,7 +643,7 @@ mod tests {
         centres.extend((1..300).map(|k| end + DVec3::Z * 0.02 * f64::from(k)));
         let judged = judge(&job, &oracle, &centres, None, &());
         assert!(
-            (judged.path_error_mm.value - 0.001).abs() < 5e-6,
+            (error_mm(&judged) - 0.001).abs() < 5e-6,
             "{:?}",
             judged.path_error_mm
         );

@@ -329,25 +329,31 @@ fn required_s(order: usize, limit: f64) -> f64 {
 /// One sentence per limit that is exceeded by more than its tolerance, or of which the positions do not tell.
 #[must_use]
 pub fn failures(peaks: &Peaks) -> Vec<String> {
-    let mut sentences = Vec::new();
-    for (peak, (name, unit)) in peaks.iter().zip(ORDERS) {
-        let axis = peak.axis;
-        let share = peak.share.unwrap_or(0.0);
-        match peak.verdict {
-            Verdict::Met => {}
-            Verdict::Violated => sentences.push(format!(
-                "{} uses {share:.3} of its {name} limit ({:.1} {unit}) at tick {}: lower the feed",
-                AXES[axis], peak.axes[axis], peak.ticks[axis]
-            )),
-            Verdict::Unknown => sentences.push(format!(
-                "cannot tell whether {} keeps its {name} limit: over the {:.3} ms that positions known to {POSITION_NM} nm need, a break of the \
-                 limit averages out; at least {share:.3} of it is used",
-                AXES[axis],
-                1e3 * peak.base_s
-            )),
-        }
+    let sentences = peaks
+        .iter()
+        .enumerate()
+        .filter_map(|(order, peak)| failure(order, peak));
+    sentences.collect()
+}
+
+/// The sentence for one of the [`ORDERS`].
+pub(crate) fn failure(order: usize, peak: &Peak) -> Option<String> {
+    let (name, unit) = ORDERS[order];
+    let axis = peak.axis;
+    let share = peak.share.unwrap_or(0.0);
+    match peak.verdict {
+        Verdict::Met => None,
+        Verdict::Violated => Some(format!(
+            "{} uses {share:.3} of its {name} limit ({:.1} {unit}) at tick {}: lower the feed",
+            AXES[axis], peak.axes[axis], peak.ticks[axis]
+        )),
+        Verdict::Unknown => Some(format!(
+            "cannot tell whether {} keeps its {name} limit: over the {:.3} ms that positions known to {POSITION_NM} nm need, a break of the \
+             limit averages out; at least {share:.3} of it is used",
+            AXES[axis],
+            1e3 * peak.base_s
+        )),
     }
-    sentences
 }
 
 #[cfg(test)]

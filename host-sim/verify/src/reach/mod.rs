@@ -65,7 +65,7 @@ pub fn measure(
     }
     progress.begin("reach", 0);
     let surface = SurfaceObstacle::new(oracle);
-    // The surface goes on where its face has ended; the whole part is checked elsewhere, face by face.
+    // The surface goes on where its face has ended; `verify` and `judge` check the whole part, face by face (`part::check_run`).
     let is_obstacle = job.origin.part().is_none();
     if is_obstacle {
         findings.extend(ball_between_passes(job, &surface, motion));

@@ -1,6 +1,5 @@
 //! Axis travel of a tool path.
 
-use super::track::ToolPath;
 use job::AXES;
 use job::MachineSpec;
 
@@ -14,10 +13,9 @@ pub struct AxisTravel {
 }
 
 impl AxisTravel {
-    /// Measures the travel of a tool path.
+    /// Measures the travel of a tool path from least to greatest positions.
     #[must_use]
-    pub fn new(track: &ToolPath, machine: &MachineSpec) -> Self {
-        let extent_mm = track.extent_mm();
+    pub fn new(extent_mm: Option<[[f64; 2]; 3]>, machine: &MachineSpec) -> Self {
         let mut beyond_mm = [[0.0; 2]; 3];
         if let (Some(extent), Some(travel)) = (extent_mm, machine.travel_mm) {
             for axis in 0..3 {
@@ -37,7 +35,7 @@ impl AxisTravel {
     }
 
     /// One sentence per axis whose travel is exceeded.
-    pub(super) fn failures(&self, machine: &MachineSpec) -> Vec<String> {
+    pub(crate) fn failures(&self, machine: &MachineSpec) -> Vec<String> {
         let (Some(extent), Some(travel)) = (self.extent_mm, machine.travel_mm) else {
             return Vec::new();
         };

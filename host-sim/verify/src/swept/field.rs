@@ -46,14 +46,14 @@ impl FieldPoint {
 /// Heights over the surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct HeightField {
-    /// The highest place found.
-    pub highest: FieldPoint,
-    /// The lowest: below zero a gouge.
-    pub lowest: FieldPoint,
+    /// The highest place found; `None`, as all others, where passes serve no point of the grid.
+    pub highest: Option<FieldPoint>,
+    /// The lowest of the whole surface: below zero a gouge.
+    pub lowest: Option<FieldPoint>,
     /// Mean over the area, gouges counted as zero, mm.
-    pub mean_mm: f64,
+    pub mean_mm: Option<f64>,
     /// Share of the area that no ball reaches.
-    pub uncut_share: f64,
+    pub uncut_share: Option<f64>,
     /// Points of the grid.
     pub points: usize,
 }
@@ -61,7 +61,7 @@ pub struct HeightField {
 /// Largest number of points of the thinned field.
 const THINNED_MAX: usize = 20_000;
 
-/// Measures the heights that a path leaves. Also returns lines of the field, thinned, along the path parameter.
+/// Measures the heights that a path leaves where passes serve the surface; what it cuts on the whole surface. Also returns lines of the field, thinned, along the path parameter.
 #[must_use]
 pub fn height_field(
     oracle: &Oracle,
@@ -73,16 +73,19 @@ pub fn height_field(
     let missed = MISSED_RADII * oracle.radius_mm;
     let heights = Heights { oracle, tree: &tree };
     progress.begin("heights", grid.count() as u64);
-    let places: Vec<(FieldPoint, f64)> = (0..grid.count())
+    let cells: Vec<(FieldPoint, f64, bool)> = (0..grid.count())
         .into_par_iter()
         .filter_map(|index| {
             progress.done(1);
             let cell = grid.cell(index);
             let (u, v) = cell.middle();
-            let (place, area) = heights.served([u, v])?;
-            Some((place, area * (cell.u[1] - cell.u[0]) * (cell.v[1] - cell.v[0])))
+            let (place, area) = heights.at([u, v])?;
+            let area = area * (cell.u[1] - cell.u[0]) * (cell.v[1] - cell.v[0]);
+            Some((place, area, oracle.is_served(u, v)))
         })
         .collect();
+    let served = cells.iter().filter(|(.., is_served)| *is_served);
+    let places: Vec<(FieldPoint, f64)> = served.map(|(place, area, _)| (*place, *area)).collect();
     let area: f64 = places.iter().map(|(_, area)| area).sum();
     let sum: f64 = places
         .iter()
@@ -97,12 +100,13 @@ pub fn height_field(
         let edges = &grid.edges[axis];
         edges.windows(2).map(|ends| ends[1] - ends[0]).fold(0.0, f64::max)
     });
-    let starts = || places.iter().map(|(place, _)| *place).collect();
+    let starts = places.iter().map(|(place, _)| *place).collect();
+    let anywhere = cells.iter().map(|(place, ..)| *place).collect();
     let field = HeightField {
-        highest: heights.extreme(starts(), 1.0, [du, dv]),
-        lowest: heights.extreme(starts(), -1.0, [du, dv]),
-        mean_mm: if area > 0.0 { sum / area } else { 0.0 },
-        uncut_share: if area > 0.0 { uncut.abs() / area } else { 0.0 },
+        highest: heights.extreme(starts, 1.0, [du, dv]),
+        lowest: heights.extreme(anywhere, -1.0, [du, dv]),
+        mean_mm: (area > 0.0).then_some(sum / area),
+        uncut_share: (area > 0.0).then_some(uncut.abs() / area),
         points: places.len(),
     };
     (field, heights.thinned(&grid))
@@ -137,8 +141,13 @@ impl Heights<'_> {
         self.oracle.is_served(u, v).then(|| self.at(uv)).flatten()
     }
 
-    /// The highest place (`sign` 1), or the lowest (-1), from the best of these; `steps`: first steps of the search in u and v.
-    pub(super) fn extreme(&self, mut starts: Vec<FieldPoint>, sign: f64, steps: [f64; 2]) -> FieldPoint {
+    /// The highest place that passes serve (`sign` 1), or the lowest of all (-1), from the best of these, if there are any; `steps`: first steps of the search in u and v.
+    pub(super) fn extreme(
+        &self,
+        mut starts: Vec<FieldPoint>,
+        sign: f64,
+        steps: [f64; 2],
+    ) -> Option<FieldPoint> {
         starts.sort_by(|a, b| (sign * b.height_mm).total_cmp(&(sign * a.height_mm)));
         let searched = starts
             .par_iter()
@@ -151,7 +160,7 @@ impl Heights<'_> {
                 a
             }
         };
-        searched.reduce_with(best).unwrap_or_default()
+        searched.reduce_with(best)
     }
 
     /// Lines of the field along the path parameter, through the middles of evenly spread cells.
@@ -203,7 +212,12 @@ impl Heights<'_> {
             ] {
                 let u = (best.uv[0] + f64::from(i) * du).clamp(u0, u1);
                 let v = (best.uv[1] + f64::from(j) * dv).clamp(v0, v1);
-                if let Some((place, _)) = self.served([u, v])
+                let there = if sign > 0.0 {
+                    self.served([u, v])
+                } else {
+                    self.at([u, v])
+                };
+                if let Some((place, _)) = there
                     && sign * place.height_mm > sign * best.height_mm
                 {
                     (best, moved) = (place, true);

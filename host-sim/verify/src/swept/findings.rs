@@ -2,6 +2,7 @@
 
 use super::Requirements;
 use super::axes::AxisTravel;
+use super::field::FieldPoint;
 use super::gouge::GougeSearchResult;
 use super::original::OriginalDeviation;
 use super::region::RegionHeights;
@@ -122,7 +123,7 @@ pub struct Ridge {
 pub struct SweptResult {
     /// The highest ridge. Zero with fewer than two complete passes: `ridges` is empty then.
     pub scallop_max: HighestScallop,
-    /// Verdict on the highest ridge, and on a region's places. [`Verdict::Unknown`]: the error bound is above [`super::ERROR_SHARE_MAX`] of the limit, or there are
+    /// Verdict on the highest ridge. [`Verdict::Unknown`]: the error bound is above [`super::ERROR_SHARE_MAX`] of the limit, or there are
     /// fewer than two whole passes.
     pub scallop_verdict: Verdict,
     /// Verdict on gouges: deeper by more than the error bound than the tolerance of the part whose face this is, or than 0 where there is none. [`Verdict::Unknown`]: the bound of the search is above [`super::ERROR_SHARE_MAX`] of the scallop limit.
@@ -145,6 +146,8 @@ pub struct SweptResult {
     pub gouge_cells_exhausted: bool,
     /// Heights in a drawn region, place by place; `None` on others, and where the run is not complete.
     pub region: Option<RegionHeights>,
+    /// Verdict on those that passes serve, beside that on the ridges; [`Verdict::Unknown`] where there are none.
+    pub region_verdict: Verdict,
     /// Whether the run reached its end.
     pub is_complete: bool,
     /// Ridges, one per gap, thinned to 100 000 points in total.
@@ -200,8 +203,8 @@ impl SweptResult {
         };
         scallop_max.error_mm += measurement_error.rounding_mm + measurement_error.search_mm;
         let of_places_mm = |region: &RegionHeights| {
-            (deviation_mm + ROUNDING_MM) * sensitivity_of(region.highest.height_mm)
-                + measurement_error.search_mm
+            let height_mm = region.highest.map_or(0.0, |highest| highest.height_mm);
+            (deviation_mm + ROUNDING_MM) * sensitivity_of(height_mm) + measurement_error.search_mm
         };
         let mut findings = Self {
             scallop_max,
@@ -216,6 +219,7 @@ impl SweptResult {
             gouge_bound_mm: parts.search.bound_mm,
             gouge_cells_exhausted: parts.search.exhausted,
             region: parts.region,
+            region_verdict: Verdict::Unknown,
             is_complete: parts.complete,
             ridges: thinned(oracle, parts),
             stations: parts.ridges.iter().map(|ridge| ridge.crests.len()).sum(),
@@ -235,14 +239,15 @@ impl SweptResult {
             .and_then(|region| region.failure(job, limit_mm - by_original_mm, of_places_mm(region)));
         let surely_above = findings.scallop_max.height_mm - findings.scallop_max.error_mm > limit_mm
             || over_surface_mm - findings.measurement_error_mm > limit_mm - by_original_mm;
-        let of_ridges = findings.judge_scallop(job, limit_mm, surely_above);
-        findings.scallop_verdict = if region_failure.is_some() {
-            Verdict::Violated
-        } else {
-            of_ridges
+        findings.scallop_verdict = findings.judge_scallop(job, limit_mm, surely_above);
+        let highest = parts.region.and_then(|region| region.highest);
+        findings.region_verdict = match (highest, &region_failure) {
+            (None, _) => Verdict::Unknown,
+            (Some(_), None) => Verdict::Met,
+            (Some(_), Some(_)) => Verdict::Violated,
         };
         findings.gouge_verdict = findings.judge_gouge(job);
-        findings.failures = findings.failing(job, of_ridges, region_failure);
+        findings.failures = findings.failing(job, region_failure);
         findings.warnings = findings.failures.clone();
         findings.warnings.extend(findings.other_warnings(job, parts));
         findings
@@ -260,6 +265,13 @@ impl SweptResult {
         self.gouge
             .as_ref()
             .filter(|_| self.gouge_verdict == Verdict::Violated)
+    }
+
+    /// The highest place of a drawn region, where it is higher than allowed.
+    #[must_use]
+    pub fn violating_place(&self) -> Option<&FieldPoint> {
+        let is_violated = self.region_verdict == Verdict::Violated;
+        self.region.as_ref().filter(|_| is_violated)?.highest.as_ref()
     }
 
     /// Whether the material at the highest ridge is out of every ball's reach.
@@ -317,14 +329,14 @@ impl SweptResult {
         job.region.is_some() && self.ridges.is_empty() && self.is_complete
     }
 
-    /// The reason against the ridges, by the verdict on them.
-    fn ridges_failure(&self, job: &Job, verdict: Verdict) -> Option<String> {
+    /// The reason against the ridges.
+    fn ridges_failure(&self, job: &Job) -> Option<String> {
         let (most, limit) = (&self.scallop_max, job.scallop_mm);
         let place = format!(
             "between passes {} and {} at u = {:.6}, v = {:.6}",
             most.passes[0], most.passes[1], most.u, most.v
         );
-        match verdict {
+        match self.scallop_verdict {
             Verdict::Met => None,
             Verdict::Violated if self.uncut(job) => Some(format!("no ball reaches the material {place}")),
             Verdict::Violated if self.original.is_some() => Some(format!(
@@ -395,11 +407,11 @@ impl SweptResult {
         }
     }
 
-    fn failing(&self, job: &Job, of_ridges: Verdict, region_failure: Option<String>) -> Vec<String> {
+    fn failing(&self, job: &Job, region_failure: Option<String>) -> Vec<String> {
         if !self.has_samples() {
             return vec!["nothing is measured: the run has no sample".to_owned()];
         }
-        let mut failures: Vec<String> = self.ridges_failure(job, of_ridges).into_iter().collect();
+        let mut failures: Vec<String> = self.ridges_failure(job).into_iter().collect();
         failures.extend(region_failure);
         if self.gouge_verdict == Verdict::Unknown {
             failures.push(format!(

@@ -173,7 +173,7 @@ pub fn measure(
         ridges: &ridges,
         search,
         deviation_mm: &smooth.deviation_mm,
-        axes: AxisTravel::new(emitted, &job.machine),
+        axes: AxisTravel::new(emitted.extent_mm(), &job.machine),
         shape: SurfaceCheck::new(oracle, &grid),
         complete,
         requirements,

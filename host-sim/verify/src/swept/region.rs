@@ -44,10 +44,10 @@ pub struct RegionHeights {
     pub served_share: f64,
     /// Share of it in gaps whose ridge is measured.
     pub ridges_share: f64,
-    /// The highest place that passes serve; height 0 if there is none.
-    pub highest: FieldPoint,
-    /// The highest place nearer to the boundary.
-    pub highest_beside: FieldPoint,
+    /// The highest place that passes serve; `None` if they serve none.
+    pub highest: Option<FieldPoint>,
+    /// The highest place nearer to the boundary, if there is one.
+    pub highest_beside: Option<FieldPoint>,
     /// Share of the region that is nearer to the boundary and above the permitted height.
     pub above_share: f64,
     /// Number of places.
@@ -59,7 +59,11 @@ pub struct RegionHeights {
 impl RegionHeights {
     /// The reason against a job whose limit is exceeded by more than the error, mm.
     pub(super) fn failure(&self, job: &Job, limit_mm: f64, error_mm: f64) -> Option<String> {
-        let (height_mm, [u, v]) = (self.highest.height_mm, self.highest.uv);
+        let FieldPoint {
+            height_mm,
+            uv: [u, v],
+            ..
+        } = self.highest?;
         (height_mm - error_mm > limit_mm * (1.0 + SERVED_SLACK)).then(|| {
             if height_mm >= MISSED_RADII * job.radius_mm {
                 return format!("no ball reaches the material at u = {u:.6}, v = {v:.6}, half a step-over or more within the region");
@@ -88,14 +92,17 @@ impl RegionHeights {
     }
 
     fn high_beside(&self, job: &Job) -> Option<String> {
-        let height_mm = self.highest_beside.height_mm;
+        let FieldPoint {
+            height_mm,
+            uv: [u, v],
+            ..
+        } = self.highest_beside?;
         (height_mm > USUAL * job.scallop_mm).then(|| {
             let most = if height_mm >= MISSED_RADII * job.radius_mm {
                 "no ball reaches some of it".to_owned()
             } else {
                 format!("up to {height_mm:.4} mm")
             };
-            let [u, v] = self.highest_beside.uv;
             format!(
                 "{:.1} % of the region, nearer than half a step-over to its boundary, is left higher than the limit ({most}, at u = {u:.4}, v = {v:.4}): draw the region larger by half a \
                  step-over ({:.2} mm on a plane) where nothing is in the way",
@@ -114,11 +121,11 @@ struct Line {
     in_ridges: f64,
     above: f64,
     places: usize,
-    highest_beside: FieldPoint,
+    highest_beside: Option<FieldPoint>,
     highest: Vec<FieldPoint>,
 }
 
-/// The lines and the places on them.
+/// The lines and the places on them, over the extent of the region.
 struct Grid {
     path: [f64; 2],
     side: [f64; 2],
@@ -129,11 +136,11 @@ struct Grid {
 
 impl Grid {
     fn new(job: &Job, oracle: &Oracle) -> Self {
-        let (path, side) = (oracle.path_range(), oracle.side_range());
+        let [path, side] = oracle.region_extent();
         let at = |[low, high]: [f64; 2], k: u32| {
             low + (high - low) * (f64::from(k) + 0.5) / f64::from(SPEED_LINES)
         };
-        // Most step-overs along and across the whole range.
+        // Most step-overs along and across all of it.
         let mut most = [0.0_f64; 2];
         for (i, k) in (0..SPEED_LINES).flat_map(|i| (0..SPEED_LINES).map(move |k| (i, k))) {
             let (u, v) = oracle.swapped(at(path, i), at(side, k));
@@ -223,13 +230,13 @@ impl RegionSearch<'_> {
             grid.spacing(),
         ];
         let (du, dv) = self.oracle.swapped(steps[0], steps[1]);
-        let besides = lines.iter().map(|line| line.highest_beside);
+        let besides = lines.iter().filter_map(|line| line.highest_beside);
         RegionHeights {
             area_mm2: area * grid.share(),
             served_share: share(sum(&|line| line.served)),
             ridges_share: share(sum(&|line| line.in_ridges)),
             highest: heights.extreme(starts, 1.0, [du, dv]),
-            highest_beside: besides.reduce(FieldPoint::higher).unwrap_or_default(),
+            highest_beside: besides.reduce(FieldPoint::higher),
             above_share: share(sum(&|line| line.above)),
             places: lines.iter().map(|line| line.places).sum(),
             places_a_step_over: grid.places_a_step_over,
@@ -259,7 +266,8 @@ impl RegionSearch<'_> {
                 line.served += area;
                 served.push((k, place));
             } else {
-                line.highest_beside = line.highest_beside.higher(place);
+                let before = line.highest_beside.unwrap_or(place);
+                line.highest_beside = Some(before.higher(place));
                 if place.height_mm > self.limit_mm {
                     line.above += area;
                 }
@@ -333,4 +341,42 @@ fn maximum(value: impl Fn(f64) -> f64, [mut low, mut high]: [f64; 2]) -> f64 {
         }
     }
     if at_left > at_right { left } else { right }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use job::Region;
+
+    /// The places of a small region of a large surface are all within its extent, so it is measured as densely as a surface of its size.
+    #[test]
+    fn places_are_spent_on_the_region() {
+        let mut job = job_file::parse("plate.toml", include_str!("../../../../jobs/plate.toml")).unwrap();
+        job.scallop_mm = 2e-5;
+        let grid = |job: &Job| Grid::new(job, &Oracle::new(job).unwrap());
+        let [[u0, u1], [v0, v1]] = job.surface.domain();
+        let at = |u: f64, v: f64| [u0 + u * (u1 - u0), v0 + v * (v1 - v0)];
+        let square = |from: f64, to: f64| {
+            Region::new(vec![vec![at(from, from), at(to, from), at(to, to), at(from, to)]])
+        };
+        job.region = Some(square(0.0, 1.0));
+        let whole = grid(&job);
+        assert!(whole.places_a_step_over < 0.5 * FEW_A_STEP_OVER);
+        job.region = Some(square(0.5, 0.54));
+        let small = grid(&job);
+        assert!(
+            small.places_a_step_over >= FEW_A_STEP_OVER,
+            "{}",
+            small.places_a_step_over
+        );
+        let [low, high] = [at(0.5, 0.5), at(0.54, 0.54)];
+        let (first, last) = (small.place(0), small.place(small.places - 1));
+        let (path, side) = match job.along {
+            Along::U => (0, 1),
+            _ => (1, 0),
+        };
+        assert!(low[side] < first && last < high[side]);
+        let (first, last) = (small.line(0), small.line(small.lines - 1));
+        assert!(low[path] < first && last < high[path]);
+    }
 }
