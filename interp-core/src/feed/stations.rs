@@ -311,10 +311,10 @@ impl Window {
         }
     }
 
-    /// Length of the cells that the derivatives are taken over, mm, as far as rounding matters; see [`Stations::note_spacing`].
+    /// Length of cells with differences of positions that are as good as these derivatives, mm; see [`Stations::note_spacing`].
     pub(crate) fn noise_spacing_mm(&self) -> f32 {
         if self.has_directions() {
-            f32::MAX
+            self.spacing_mm().at_least(CELL_MIN_MM)
         } else {
             self.spacing_mm()
         }

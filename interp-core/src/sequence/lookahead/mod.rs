@@ -85,7 +85,7 @@ mod cycles {
     pub(super) const FRONT_PATCH: u32 = 5_600;
     pub(super) const PIECE: u32 = 5_000;
     pub(super) const EXTEND: u32 = 3_500;
-    pub(super) const FRONT_STATION: u32 = 5_400;
+    pub(super) const FRONT_STATION: u32 = 7_000;
     pub(super) const DERIVATIVES: u32 = 3_400;
     pub(super) const SLOW_DOWN: u32 = 5_000;
     pub(super) const CLOSE: u32 = 1_700;
