@@ -245,15 +245,19 @@ pub(crate) const WINDOW: usize = 5;
 pub(crate) struct Window {
     /// Position, nm, and arc, mm; the oldest first.
     points: [([i32; 3], f32); WINDOW],
-    /// First derivative by the arc at each, if it is known.
-    directions: [Option<[f32; 3]>; WINDOW],
+    /// First derivative by the arc at each; how many of the last ones are known, and the greatest component so far.
+    directions: [[f32; 3]; WINDOW],
+    known: usize,
+    greatest: f32,
     count: usize,
 }
 
 impl Window {
     pub(crate) const EMPTY: Self = Self {
         points: [([0; 3], 0.0); WINDOW],
-        directions: [None; WINDOW],
+        directions: [[0.0; 3]; WINDOW],
+        known: 0,
+        greatest: 1.0,
         count: 0,
     };
 
@@ -284,17 +288,24 @@ impl Window {
         }
         if let Some(place) = self.points.get_mut(self.count) {
             *place = (centre_nm, arc_mm);
-            if let Some(place) = self.directions.get_mut(self.count) {
-                *place = direction;
-            }
+            self.known = if let Some(direction) = direction {
+                if let Some(place) = self.directions.get_mut(self.count) {
+                    *place = direction;
+                }
+                for part in direction {
+                    self.greatest = self.greatest.at_least(part.abs());
+                }
+                (self.known + 1).min(WINDOW)
+            } else {
+                0
+            };
             self.count += 1;
         }
     }
 
     /// Whether the first derivative is known at all of the positions.
-    pub(crate) fn has_directions(&self) -> bool {
-        let directions = self.directions.get(..self.count).unwrap_or(&[]);
-        directions.iter().all(Option::is_some)
+    pub(crate) const fn has_directions(&self) -> bool {
+        self.known >= self.count
     }
 
     /// Errors of the three derivatives, by rounding.
@@ -302,9 +313,7 @@ impl Window {
         let inverse = 1.0 / self.spacing_mm().at_least(1e-3);
         let [square, cube] = [inverse * inverse, inverse * inverse * inverse];
         if self.has_directions() {
-            let components = self.directions.iter().flatten().flatten();
-            let size = components.fold(1.0_f32, |most, part| most.at_least(part.abs()));
-            let [first, second, third] = DIRECTION_NOISE.map(|noise| noise * size);
+            let [first, second, third] = DIRECTION_NOISE.map(|noise| noise * self.greatest);
             [first, second * inverse, third * square]
         } else {
             [FIRST_NOISE * inverse, SECOND_NOISE * square, THIRD_NOISE * cube]
@@ -336,7 +345,7 @@ impl Window {
         for (axis, q) in q.iter_mut().enumerate() {
             let mut differences = [0.0; WINDOW];
             if has_directions {
-                for (difference, direction) in differences.iter_mut().zip(self.directions.iter().flatten()) {
+                for (difference, direction) in differences.iter_mut().zip(&self.directions) {
                     *difference = direction.get(axis).copied().unwrap_or(0.0);
                 }
             } else {

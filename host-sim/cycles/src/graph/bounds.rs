@@ -230,14 +230,9 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "stations that are looked through: STATIONS_MAX",
     ),
     (
-        "interp_core::feed::stations::Window::has_directions",
-        5,
-        "positions of a derivative: WINDOW",
-    ),
-    (
         "interp_core::sequence::lookahead::stations::differentiate",
-        5,
-        "positions of a derivative: WINDOW; both stations of a group",
+        2,
+        "both stations of a group",
     ),
     (
         "interp_core::feed::stations::Window::derivatives",

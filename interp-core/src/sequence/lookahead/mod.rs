@@ -86,7 +86,7 @@ mod cycles {
     pub(super) const PIECE: u32 = 5_000;
     pub(super) const EXTEND: u32 = 3_500;
     pub(super) const FRONT_STATION: u32 = 7_000;
-    pub(super) const DERIVATIVES: u32 = 3_400;
+    pub(super) const DERIVATIVES: u32 = 3_800;
     pub(super) const SLOW_DOWN: u32 = 5_000;
     pub(super) const CLOSE: u32 = 1_700;
     pub(super) const HALF: u32 = 1_500;
