@@ -12,7 +12,7 @@ mod turn_search;
 mod within;
 
 use crate::fault::{Fault, FaultKind, Result};
-use crate::feed::stations::{Derivatives, STATIONS_MAX, Station, Window};
+use crate::feed::stations::{CELL_FINE_MM, Derivatives, STATIONS_MAX, Station, Window};
 use crate::feed::turn::{self, Turn, TurnEnd};
 use crate::feed::{MM_PER_Q10, to_q10};
 use crate::job::program::Job;
@@ -76,17 +76,14 @@ enum Task {
 
 /// Cycles of the tasks, by the pessimistic model of `cargo sim budget`.
 mod cycles {
-    pub(super) use crate::pass::scan::cycles::{ESTIMATE, NEXT, PATCH};
-
-    /// A station of a straight pass, with the direction of the centre's path.
-    pub(super) const STATION: u32 = crate::pass::scan::cycles::STATION + 600;
+    pub(super) use crate::pass::scan::cycles::{ESTIMATE, NEXT, PATCH, STATION};
 
     /// On a front: the first patch of a stretch, a later piece, the search for it, a station.
     pub(super) const FRONT_PATCH: u32 = 5_600;
     pub(super) const PIECE: u32 = 5_000;
     pub(super) const EXTEND: u32 = 3_500;
-    pub(super) const FRONT_STATION: u32 = 7_000;
-    pub(super) const DERIVATIVES: u32 = 3_800;
+    pub(super) const FRONT_STATION: u32 = 4_800;
+    pub(super) const DERIVATIVES: u32 = 3_400;
     pub(super) const SLOW_DOWN: u32 = 5_000;
     pub(super) const CLOSE: u32 = 1_700;
     pub(super) const HALF: u32 = 1_500;
@@ -115,11 +112,10 @@ pub(crate) struct Lookahead {
     begun: u16,
     halvings: u8,
     is_coarse: bool,
-    /// The stretch is one piece; the path span, and the place in it up to which those of a front are, because it bends.
-    by_pieces: bool,
-    bends_until: Option<(u16, u64)>,
     /// Stations of the patch are kept at its even cells alone.
     keeps_even: bool,
+    /// Length of a cell that is not halved, mm.
+    cell_mm: f32,
     /// Least length of a stretch of the pass, mm, and length of the last pass.
     least_mm: f32,
     pass_mm: f32,
@@ -193,9 +189,8 @@ impl Lookahead {
         begun: 0,
         halvings: 0,
         is_coarse: false,
-        by_pieces: false,
-        bends_until: None,
         keeps_even: false,
+        cell_mm: CELL_FINE_MM,
         least_mm: STRETCH_MIN_MM,
         pass_mm: 0.0,
         station: 0,
@@ -286,7 +281,6 @@ impl Lookahead {
         self.task = if has_head { Task::Head(0) } else { Task::Patch };
         (self.station, self.patches) = (0, 0);
         (self.halvings, self.is_coarse, self.keeps_even) = (0, false, false);
-        (self.by_pieces, self.bends_until) = (false, None);
         self.start_q10 = if has_head { head.half_q10() } else { 0 };
         out.head = if has_head { turn::STATIONS } else { 0 };
         out.head_q10 = self.start_q10;

@@ -4,13 +4,12 @@ use super::stretch::HALVED_MIN_MM;
 use super::{CELL_KEPT_MM, Lookahead, PATCHES, PassPlan, Task, check_crease, check_travel, stations_of};
 use crate::fault::{Fault, FaultKind, Result};
 use crate::feed::stations::{
-    CELL_MIN_MM, CELLS_FINE, CELLS_MANY, Derivatives, Station, WINDOW, Window, parts_of_cell,
+    CELL_MIN_MM, CELLS_FINE, CELLS_MANY, Derivatives, FIRST_NOISE, Station, WINDOW, Window, parts_of_cell,
 };
 use crate::job::program::Job;
 use crate::job::{AxisLimits, SurfaceKind};
 use crate::math::arith::{fraction_to_f32, sqrt, truncated};
 use crate::math::number::{Bounded, MM_PER_NM, nm_to_mm, to_f32};
-use crate::math::vec3::Vec3;
 use crate::pass::step_over::StepOverEstimator;
 use crate::sequence::link::is_elsewhere;
 use crate::surface::{Contact, PathSpeed};
@@ -54,7 +53,7 @@ impl Lookahead {
         let turns =
             |[length, centre]: &[f32; 2]| CENTRE_SHARE * centre > *length || hardly_fits(*length, *centre);
         self.may_turn = halves.iter().any(turns);
-        self.adapts = spans == 1;
+        self.adapts = spans == 1 && !self.may_turn;
         let length = length.at_least(by_centre);
         if out.cells == 0 {
             let [start, end] = out.route.ends;
@@ -188,7 +187,7 @@ impl Lookahead {
             let q = self.window.derivatives(usize::from(at));
             let begins = station == 0 && self.patches.is_multiple_of(out.group);
             for back in [1, 2] {
-                stations.note_spacing(back, self.window.noise_spacing_mm());
+                stations.note_spacing(back, self.window.spacing_mm());
                 if let Some(place) = stations.back_mut(back) {
                     widen(&mut place.q, &q, begins || back == 1);
                 }
@@ -201,7 +200,7 @@ impl Lookahead {
     /// Stores the derivatives at the start of a patch, or of a stretch, in the station so far from the last one.
     pub(super) fn store_start(&mut self, back: u16, q: Derivatives, out: &mut PassPlan) {
         let stations = &mut out.plan.stations;
-        stations.note_spacing(back, self.window.noise_spacing_mm());
+        stations.note_spacing(back, self.window.spacing_mm());
         let Some(place) = stations.back_mut(back) else {
             return;
         };
@@ -242,8 +241,7 @@ impl Lookahead {
         } else {
             16.0 * (turn * turn * turn * turn + change * change)
         };
-        let [noise, ..] = self.window.noise();
-        jump > BEND_MIN + noise + first * error
+        jump > BEND_MIN + FIRST_NOISE / cell + first * error
     }
 
     /// Evaluations of the step-over estimator at a station.
@@ -270,7 +268,7 @@ impl Lookahead {
         out: &mut PassPlan,
     ) -> Result<()> {
         let fraction = self.fraction();
-        let (contact, located, direction) = self.patch.evaluate_with_direction(fraction)?;
+        let (contact, located) = self.patch.evaluate(fraction)?;
         check_travel(axes, &located.cl_nm)?;
         check_height(axes, &located.cl_nm)?;
         self.see(job, fraction, &contact);
@@ -314,8 +312,7 @@ impl Lookahead {
         }
         self.bend = bend;
         self.speed = path;
-        let direction = direction.map(|Vec3 { x, y, z }| [x, y, z]);
-        self.window.push(located.cl_nm, self.arc_mm, direction);
+        self.window.push(located.cl_nm, self.arc_mm);
         self.keep(out);
         Ok(())
     }
