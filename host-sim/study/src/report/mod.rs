@@ -19,7 +19,7 @@ use ::report::page::STYLE;
 
 /// The page.
 pub const PAGE: &str = "index.html";
-/// The files that [`write`] makes.
+/// The files that [`write()`] makes.
 pub const FILES: [&str; 2] = [DATA, PAGE];
 /// The figures' data.
 const DATA: &str = "figures.json";
