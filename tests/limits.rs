@@ -1,5 +1,5 @@
-//! The axes' limits on surfaces, feeds and limits chosen at random: paths that bend within tenths of a millimetre, around points and where lines bend at a knot. The velocities hold; the
-//! campaign tells what accelerations and jerks do (docs/limits.md).
+//! The axes' limits on surfaces, feeds and limits chosen at random: paths that bend within tenths of a millimetre, around points and where lines bend at a knot. The
+//! campaign tells how far they hold (docs/limits.md).
 
 use interp_core::{Command, State};
 use job::{Along, AxisLimits, Job, NurbsSpec, Pattern, Spacing, Start, SurfaceSpec};
@@ -155,12 +155,24 @@ fn campaign(numbers: std::ops::Range<u64>, are_equal: bool, spacings: &[Spacing]
 const STRAIGHT: [Spacing; 1] = [Spacing::Exact];
 const CURVED: [Spacing; 2] = [Spacing::Constant(Start::Edge), Spacing::Constant(Start::Middle)];
 
+/// Passes over several patches use more of an acceleration: their derivatives are differences of rounded positions.
 #[test]
-fn velocities_hold() {
-    for spacings in [&STRAIGHT[..], &CURVED] {
-        let [velocity, ..] = campaign(0..40, true, spacings);
-        assert!(velocity <= PERMITTED[0], "{velocity}");
-    }
+fn straight_passes_hold_their_limits() {
+    let [velocity, acceleration, jerk] = campaign(0..40, true, &STRAIGHT);
+    assert!(
+        velocity <= PERMITTED[0] && acceleration <= 1.05 && jerk <= PERMITTED[2],
+        "{velocity} {acceleration} {jerk}"
+    );
+}
+
+/// Curved passes beside points use more: fronts wave there from piece to piece.
+#[test]
+fn curved_passes_hold_their_limits() {
+    let [velocity, acceleration, jerk] = campaign(0..40, true, &CURVED);
+    assert!(
+        velocity <= PERMITTED[0] && acceleration <= 1.05 && jerk <= PERMITTED[2],
+        "{velocity} {acceleration} {jerk}"
+    );
 }
 
 /// What a plan that had no time for its last steps may use of a jerk above what is permitted.
@@ -273,8 +285,7 @@ fn curved_passes_over_knots() {
     assert!(worst[1] <= PERMITTED[1] && worst[2] <= 2.0, "{worst:?}");
 }
 
-/// A straight pass that bends within hundredths of a millimetre, between the look-ahead's coarsest stations: 1.79 and 3.55 of the jerk limit where these alone were kept. 1.02 is wanted; within shorter
-/// cells rounded positions do not tell its third derivatives.
+/// A straight pass that bends within hundredths of a millimetre, between the look-ahead's coarsest stations: 1.79 and 3.55 of the jerk limit where these alone were kept.
 #[test]
 fn straight_passes_that_bend_within_a_cell() {
     for are_equal in [true, false] {
@@ -283,7 +294,7 @@ fn straight_passes_that_bend_within_a_cell() {
         let [_, acceleration, jerk] = uses(&job).unwrap();
         println!("{are_equal}: acceleration {acceleration:.3}, jerk {jerk:.3}");
         assert!(
-            acceleration <= PERMITTED[1] && jerk <= 1.1,
+            acceleration <= PERMITTED[1] && jerk <= PERMITTED[2],
             "{are_equal}: acceleration {acceleration}, jerk {jerk}"
         );
     }

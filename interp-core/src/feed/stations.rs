@@ -41,8 +41,15 @@ const SPACING_PARTS: f32 = 128.0;
 
 /// Error of a derivative by differences of positions rounded to a nanometre, times the cell's length to its power: three standard deviations
 /// at the end of a window.
-pub(crate) const FIRST_NOISE: f32 = 2e-6;
+const FIRST_NOISE: f32 = 2e-6;
 const SECOND_NOISE: f32 = 12e-6;
+const THIRD_NOISE: f32 = 60e-6;
+/// The same by differences of first derivatives in single precision, of which none is above 1: of the first, of the second times the length, of the third times its square.
+const DIRECTION_NOISE: [f32; 3] = [1e-6, 1.6e-6, 4e-6];
+
+/// Least mean length of cells for differences of first derivatives, mm, and what a distance of positions rounded to a nanometre is off by, mm.
+const DIRECTIONS_MIN_MM: f32 = 5e-4;
+const ROUNDING_MM: f32 = 2e-6;
 
 /// Least length of a cell, mm: a shorter one has differences of rounded positions.
 pub(crate) const CELL_MIN_MM: f32 = 0.15;
@@ -242,12 +249,19 @@ pub(crate) const WINDOW: usize = 5;
 pub(crate) struct Window {
     /// Position, nm, and arc, mm; the oldest first.
     points: [([i32; 3], f32); WINDOW],
+    /// First derivative by the arc at each; how many of the last ones are known, and the greatest component so far.
+    directions: [[f32; 3]; WINDOW],
+    known: usize,
+    greatest: f32,
     count: usize,
 }
 
 impl Window {
     pub(crate) const EMPTY: Self = Self {
         points: [([0; 3], 0.0); WINDOW],
+        directions: [[0.0; 3]; WINDOW],
+        known: 0,
+        greatest: 1.0,
         count: 0,
     };
 
@@ -267,20 +281,90 @@ impl Window {
         (self.arc_mm(last) - self.arc_mm(0)) / intervals
     }
 
-    /// Appends a position; the oldest is dropped.
-    pub(crate) fn push(&mut self, centre_nm: [i32; 3], arc_mm: f32) {
+    /// Appends a position with the first derivative there, if it is known; the oldest is dropped.
+    pub(crate) fn push(&mut self, centre_nm: [i32; 3], arc_mm: f32, direction: Option<[f32; 3]>) {
         if self.count == WINDOW {
             let [_, b, c, d, e] = self.points;
             self.points = [b, c, d, e, e];
+            let [_, b, c, d, e] = self.directions;
+            self.directions = [b, c, d, e, e];
             self.count -= 1;
         }
         if let Some(place) = self.points.get_mut(self.count) {
             *place = (centre_nm, arc_mm);
+            self.known = if let Some(direction) = direction {
+                if let Some(place) = self.directions.get_mut(self.count) {
+                    *place = direction;
+                }
+                for part in direction {
+                    self.greatest = self.greatest.at_least(part.abs());
+                }
+                (self.known + 1).min(WINDOW)
+            } else {
+                0
+            };
             self.count += 1;
         }
     }
 
-    /// Derivatives at one of the positions, of the polynomial through all of them: Newton's divided differences.
+    /// Whether the first derivative is known at all of the positions, and these are far enough apart for its differences.
+    pub(crate) fn has_directions(&self) -> bool {
+        self.known >= self.count && self.spacing_mm() > DIRECTIONS_MIN_MM
+    }
+
+    /// The third derivative between the last two positions by which the first ones there lead from one to the other, times the cube of the cell's length and less its error by
+    /// rounding, mm: far more than at the positions where the path bends and bends back between them. 0 where the first derivatives are not known.
+    pub(crate) fn third_within(&self) -> f32 {
+        let last = self.count.saturating_sub(1);
+        let before = last.saturating_sub(1);
+        let (Some((from, from_arc)), Some((to, to_arc)), true) =
+            (self.points.get(before), self.points.get(last), self.known >= 2)
+        else {
+            return 0.0;
+        };
+        let half = 0.5 * (to_arc - from_arc);
+        let mut most = 0.0_f32;
+        for (axis, (from, to)) in from.iter().zip(to).enumerate() {
+            let direction = |at: usize| {
+                self.directions
+                    .get(at)
+                    .and_then(|parts| parts.get(axis))
+                    .map_or(0.0, |part| *part)
+            };
+            let off = nm_to_mm(to.wrapping_sub(*from)) - half * (direction(before) + direction(last));
+            most = most.at_least(12.0 * (off.abs() - ROUNDING_MM));
+        }
+        most
+    }
+
+    /// The greatest component of a first derivative so far, at least 1.
+    pub(crate) const fn greatest(&self) -> f32 {
+        self.greatest
+    }
+
+    /// Errors of the three derivatives, by rounding.
+    pub(crate) fn noise(&self) -> [f32; 3] {
+        let inverse = 1.0 / self.spacing_mm().at_least(1e-3);
+        let [square, cube] = [inverse * inverse, inverse * inverse * inverse];
+        if self.has_directions() {
+            let [first, second, third] = DIRECTION_NOISE.map(|noise| noise * self.greatest);
+            [first, second * inverse, third * square]
+        } else {
+            [FIRST_NOISE * inverse, SECOND_NOISE * square, THIRD_NOISE * cube]
+        }
+    }
+
+    /// Length of cells with differences of positions that are as good as these derivatives, mm; see [`Stations::note_spacing`].
+    pub(crate) fn noise_spacing_mm(&self) -> f32 {
+        if self.has_directions() {
+            self.spacing_mm().at_least(CELL_MIN_MM)
+        } else {
+            self.spacing_mm()
+        }
+    }
+
+    /// Derivatives at one of the positions, of the polynomial through all of them, or through the first derivatives where these are known: Newton's divided
+    /// differences.
     pub(crate) fn derivatives(&self, at: usize) -> Derivatives {
         let mut q = [[0.0; 3]; 3];
         let points = self.points.get(..self.count).unwrap_or(&[]);
@@ -291,15 +375,28 @@ impl Window {
         for (arc, (_, from_start)) in arcs.iter_mut().zip(points) {
             *arc = from_start - start;
         }
+        let has_directions = self.has_directions();
         for (axis, q) in q.iter_mut().enumerate() {
             let mut differences = [0.0; WINDOW];
-            for (difference, (centre, _)) in differences.iter_mut().zip(points) {
-                let of = |centre: &[i32; 3]| centre.get(axis).copied().unwrap_or(0);
-                *difference = nm_to_mm(of(centre).wrapping_sub(of(origin)));
+            if has_directions {
+                for (difference, direction) in differences.iter_mut().zip(&self.directions) {
+                    *difference = direction.get(axis).copied().unwrap_or(0.0);
+                }
+            } else {
+                for (difference, (centre, _)) in differences.iter_mut().zip(points) {
+                    let of = |centre: &[i32; 3]| centre.get(axis).copied().unwrap_or(0);
+                    *difference = nm_to_mm(of(centre).wrapping_sub(of(origin)));
+                }
             }
             divide(&mut differences, &arcs, points.len());
-            let [_, first, second, third] = taylor(&differences, &arcs, points.len());
-            *q = [first, 2.0 * second, 6.0 * third];
+            let series = taylor(&differences, &arcs, points.len());
+            *q = if has_directions {
+                let [first, second, third, _] = series;
+                [first, second, 2.0 * third]
+            } else {
+                let [_, first, second, third] = series;
+                [first, 2.0 * second, 6.0 * third]
+            };
         }
         q
     }

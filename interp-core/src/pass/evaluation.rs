@@ -2,6 +2,7 @@
 //! [`crate::Interpolator::evaluate`]: contact, fit, cutter location.
 
 use crate::fault::Result;
+use crate::math::vec3::Vec3;
 use crate::pass::offset::{Located, check_fit};
 use crate::pass::patch::Patch;
 use crate::surface::{Contact, Pass};
@@ -30,6 +31,17 @@ impl Patch {
     #[inline(always)]
     pub(crate) fn evaluate(&self, fraction: u64) -> Result<(Contact, Located)> {
         self.evaluate_on(&self.surface, fraction)
+    }
+
+    /// [`Self::evaluate`], and the derivative of the centre by the contact's arc; none near a pole.
+    ///
+    /// # Errors
+    /// As [`Self::evaluate_on`].
+    pub(crate) fn evaluate_with_direction(&self, fraction: u64) -> Result<(Contact, Located, Option<Vec3>)> {
+        let (contact, direction) = self.surface.contact_and_direction(fraction, &self.ball)?;
+        check_fit(&contact)?;
+        let located = self.locator.locate(&contact, &self.origin)?;
+        Ok((contact, located, direction))
     }
 
     /// [`Self::evaluate`] on a line of constant side parameter.

@@ -65,6 +65,11 @@ impl Ball {
         self.product
     }
 
+    /// An offset in the patch's units.
+    pub(crate) fn in_patch_units(&self, offset: [i32; 3]) -> Vec3 {
+        Vec3::of(offset) * (self.product * power_of_two(-33))
+    }
+
     /// The unit normal of an offset.
     pub(crate) fn normal(&self, offset: [i32; 3]) -> [f32; 3] {
         let inverse = 1.0 / self.signed_radius.abs();

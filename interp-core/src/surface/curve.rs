@@ -406,6 +406,34 @@ impl Pass for RevolvedCurve<'_> {
     }
 }
 
+impl CurvePass {
+    /// See [`super::Surface::contact_and_direction`].
+    #[inline(never)]
+    pub(super) fn contact_and_direction(
+        &self,
+        fraction: u64,
+        ball: &Ball,
+    ) -> Result<(Contact, Option<Vec3>)> {
+        let point = self.side(fraction);
+        let (path, side) = (self.own(fraction), self.own_side(&point));
+        let (contact, by, speed) = if matches!(self.kind, CurveKind::Profile | CurveKind::Circle) {
+            let (contact, by) = self.revolved(path, side, Some(ball))?;
+            (contact, by, by.speed(&point))
+        } else {
+            let at = self.grid(path, side, &point);
+            let contact = at.local.contact::<true, true>(ball, &at.factors)?;
+            (contact, at.local.bends(&at.factors), at.speed(&point))
+        };
+        let direction = by.centre_direction(point.slope, ball.in_patch_units(contact.offset));
+        let turn = if self.reversed { -1.0 } else { 1.0 };
+        let path = self.turned(speed);
+        Ok((
+            Contact { path, ..contact },
+            direction.map(|direction| direction * turn),
+        ))
+    }
+}
+
 impl Pass for CurvePass {
     #[inline(never)]
     fn contact(&self, fraction: u64, ball: &Ball) -> Result<Contact> {

@@ -50,6 +50,9 @@ use crate::math::vec3::Vec3;
 /// At 1e-3 the f32 cross product still gives the normal to 1e-4 rad; below, [`FaultKind::DegenerateSurface`].
 pub const SINE_MIN: f32 = 1e-3;
 
+/// Curvature of the parametrisation, times the ball's radius, above which the derivative of the ball's centre is not computed: it is that of a place near a pole.
+const NEAR_POLE: f32 = 1024.0;
+
 /// Square of the tangent of the angle whose sine is [`SINE_MIN`].
 const TANGENT_MIN_SQUARED: f32 = SINE_MIN * SINE_MIN / (1.0 - SINE_MIN * SINE_MIN);
 
@@ -183,6 +186,35 @@ pub(crate) struct Derivatives {
     pub(crate) side2: Vec3,
 }
 
+impl Derivatives {
+    /// Derivative of the ball's centre by the contact's arc along a curve of this slope, `offset` from the contact to the centre: with t the direction of the path and e
+    /// across it, (1 - r k) t - r w e, k the normal curvature along the path and w the geodesic torsion. None near a pole, where these are quotients of small numbers. Tangential components of
+    /// the second derivatives do not matter.
+    fn centre_direction(&self, slope: f32, offset: Vec3) -> Option<Vec3> {
+        let tangent = self.path + self.side * slope;
+        let inverse = inverse_sqrt(tangent.dot(tangent));
+        let along = tangent * inverse;
+        let across = offset.cross(along);
+        let across = across * inverse_sqrt(across.dot(across));
+        let path = offset.dot(self.path2 + self.mixed * slope);
+        let side = offset.dot(self.mixed + self.side2 * slope);
+        let curvature = (path + side * slope) * (inverse * inverse);
+        // By the derivative that is more across the path.
+        let sine_squared = |by: Vec3| by.dot(across) * by.dot(across) / by.dot(by);
+        let (by, form, change) = if sine_squared(self.path) > sine_squared(self.side) {
+            (self.path, path, self.path2 + self.mixed * slope)
+        } else {
+            (self.side, side, self.mixed + self.side2 * slope)
+        };
+        let per_beside = inverse / by.dot(across);
+        let twist = (form - by.dot(tangent) * curvature) * per_beside;
+        // The offset is known to a share of its length.
+        let size = change.dot(change) * offset.dot(offset) * (per_beside * per_beside);
+        let is_known = size < NEAR_POLE * NEAR_POLE;
+        is_known.then(|| along * (1.0 - curvature) - across * twist)
+    }
+}
+
 /// `A . A' / |A|^2` from g A, half of g A' and 1/|g A|^2. In single precision: of a patch much narrower than long, both have few of the 32 bits.
 #[inline(always)]
 fn log_speed_derivative(path: Vec3, path2: &[i32; 3], inverse_e: f32, excess: f32) -> f32 {
@@ -190,6 +222,11 @@ fn log_speed_derivative(path: Vec3, path2: &[i32; 3], inverse_e: f32, excess: f3
 }
 
 impl Local {
+    /// The derivatives of S, those of second order up to tangential components.
+    fn bends(&self, factors: &Factors) -> Derivatives {
+        self.derivatives(factors, [0.0; 2])
+    }
+
     /// The derivatives of S; `log_weight`: relative change of the weight along the path and across it.
     fn derivatives(&self, factors: &Factors, [along, across]: [f32; 2]) -> Derivatives {
         let Factors { path: a, side: b, .. } = *factors;
@@ -352,6 +389,48 @@ impl Surface {
         }
     }
 
+    /// The contact, and the derivative of the ball's centre by the contact's arc, in the direction of travel; none near a pole.
+    ///
+    /// # Errors
+    /// As [`Pass::contact`].
+    #[inline(never)]
+    pub(crate) fn contact_and_direction(
+        &self,
+        fraction: u64,
+        ball: &Ball,
+    ) -> Result<(Contact, Option<Vec3>)> {
+        let (contact, by) = match self.pass() {
+            AnyPass::Polynomial(PolynomialPass(pass))
+            | AnyPass::Ruled(RuledPass(pass))
+            | AnyPass::Extruded(ExtrudedPass(pass)) => {
+                let local = PolynomialPass(pass).local(fraction);
+                (
+                    local.contact::<true, true>(ball, &Factors::ONE)?,
+                    local.bends(&Factors::ONE),
+                )
+            }
+            AnyPass::Rational(pass) => {
+                let local = pass.local(fraction);
+                (
+                    local.contact::<true, true>(ball, &Factors::ONE)?,
+                    local.bends(&Factors::ONE),
+                )
+            }
+            AnyPass::Pole(pass) => {
+                let (local, factors) = pass.local_at(fraction);
+                (
+                    local.contact::<true, true>(ball, &factors)?,
+                    local.bends(&factors),
+                )
+            }
+            AnyPass::Profile(pass) => (pass.contact(fraction, ball)?, pass.derivatives(fraction)),
+            AnyPass::Circle(pass) => (pass.contact(fraction, ball)?, pass.derivatives(fraction)),
+            AnyPass::Curve(pass) => return pass.contact_and_direction(fraction, ball),
+        };
+        let direction = by.centre_direction(0.0, ball.in_patch_units(contact.offset));
+        Ok((contact, direction))
+    }
+
     /// The pass by its kind.
     #[inline(always)]
     pub(crate) const fn pass(&self) -> AnyPass<'_> {
@@ -418,3 +497,6 @@ pub(crate) fn path_factor(edges: Edges, at: &IsoLine) -> (f32, f32) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -279,6 +279,14 @@ impl PolePass<'_> {
     }
 }
 
+impl PolePass<'_> {
+    /// The point at a fraction of the patch, with its factors.
+    pub(super) fn local_at(&self, fraction: u64) -> (Local, Factors) {
+        let w = centred(fraction);
+        (self.local(w), self.factors(w))
+    }
+}
+
 impl Pass for PolePass<'_> {
     #[inline(never)]
     fn contact(&self, fraction: u64, ball: &Ball) -> Result<Contact> {

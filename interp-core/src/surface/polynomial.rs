@@ -106,6 +106,10 @@ fn local<const MIXED: bool, const SIDE2: bool>(pass: &GridPass, fraction: u64) -
 }
 
 impl PolynomialPass<'_> {
+    pub(super) fn local(&self, fraction: u64) -> Local {
+        local::<true, true>(self.0, fraction)
+    }
+
     /// The parametrisation at a fraction of the patch.
     pub(crate) fn path_at(&self, fraction: u64) -> PathSpeed {
         let local = local::<false, false>(self.0, fraction);

@@ -218,7 +218,7 @@ impl RationalPass<'_> {
     /// The quotient rule with the numerators' derivatives relative to the point: `w S_path = P_path - S w_path`, and
     /// `w N . S_xy = N . (P_xy - S w_xy)`, because the omitted terms are tangential.
     #[inline(always)]
-    fn local(&self, fraction: u64) -> Local {
+    pub(super) fn local(&self, fraction: u64) -> Local {
         let w = centred(fraction);
         let weight = Weight::new(self.0.weight.point(w));
         let [x, y, z] = &self.0.axes;

@@ -230,6 +230,11 @@ const BOUNDS: &[(&str, u32, &str)] = &[
         "stations that are looked through: STATIONS_MAX",
     ),
     (
+        "interp_core::sequence::lookahead::stations::differentiate",
+        2,
+        "both stations of a group",
+    ),
+    (
         "interp_core::feed::stations::Window::derivatives",
         5,
         "positions of a derivative: WINDOW",

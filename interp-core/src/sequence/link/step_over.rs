@@ -295,7 +295,7 @@ impl BoundaryStepOver {
                 let part = f32::from(index) * (1.0 / f32::from(STATIONS - 1));
                 let here = self.locate(job, part)?;
                 check_travel(axes, &here.cl_nm)?;
-                self.window.push(here.cl_nm, part * self.length);
+                self.window.push(here.cl_nm, part * self.length, None);
                 if index > 0 {
                     let cell = self.length * (1.0 / f32::from(STATIONS - 1));
                     let ratio = distance(&self.place, &here.cc_nm) / cell;

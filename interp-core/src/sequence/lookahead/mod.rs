@@ -12,7 +12,7 @@ mod turn_search;
 mod within;
 
 use crate::fault::{Fault, FaultKind, Result};
-use crate::feed::stations::{CELL_FINE_MM, Derivatives, STATIONS_MAX, Station, Window};
+use crate::feed::stations::{Derivatives, STATIONS_MAX, Station, Window};
 use crate::feed::turn::{self, Turn, TurnEnd};
 use crate::feed::{MM_PER_Q10, to_q10};
 use crate::job::program::Job;
@@ -74,15 +74,28 @@ enum Task {
     Done,
 }
 
+/// What the derivatives along a patch are differences of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum DifferencesOf {
+    Positions,
+    /// First derivatives, which are known in closed form at each station.
+    Directions,
+    /// Positions, because directions do not tell the path at cells of any length.
+    PositionsAfterAll,
+}
+
 /// Cycles of the tasks, by the pessimistic model of `cargo sim budget`.
 mod cycles {
     pub(super) use crate::pass::scan::cycles::{ESTIMATE, NEXT, PATCH, STATION};
 
+    /// A station with the direction of the centre's path, and differences of these.
+    pub(super) const DIRECTED_STATION: u32 = STATION + 700;
+    pub(super) const DIRECTED_DERIVATIVES: u32 = 3_800;
     /// On a front: the first patch of a stretch, a later piece, the search for it, a station.
     pub(super) const FRONT_PATCH: u32 = 5_600;
     pub(super) const PIECE: u32 = 5_000;
     pub(super) const EXTEND: u32 = 3_500;
-    pub(super) const FRONT_STATION: u32 = 4_800;
+    pub(super) const FRONT_STATION: u32 = 6_000;
     pub(super) const DERIVATIVES: u32 = 3_400;
     pub(super) const SLOW_DOWN: u32 = 5_000;
     pub(super) const CLOSE: u32 = 1_700;
@@ -112,10 +125,11 @@ pub(crate) struct Lookahead {
     begun: u16,
     halvings: u8,
     is_coarse: bool,
+    /// The stretch is one piece; the path span, and the place in it up to which those of a front are, because it bends.
+    by_pieces: bool,
+    bends_until: Option<(u16, u64)>,
     /// Stations of the patch are kept at its even cells alone.
     keeps_even: bool,
-    /// Length of a cell that is not halved, mm.
-    cell_mm: f32,
     /// Least length of a stretch of the pass, mm, and length of the last pass.
     least_mm: f32,
     pass_mm: f32,
@@ -127,6 +141,8 @@ pub(crate) struct Lookahead {
     looks: u16,
     cells: u16,
     cell_fraction: u64,
+    /// Cells that are looked at for each between kept stations before any are halved.
+    first_looks: u16,
     /// Mean length of a patch of the last pass, mm, or the greatest by the way of the centre around an edge; the greatest of those so far.
     patch_mm: f32,
     centre_mm: f32,
@@ -135,7 +151,9 @@ pub(crate) struct Lookahead {
     has_bend: bool,
     bends: bool,
     may_turn: bool,
-    /// Stations are kept wherever derivatives change, not at even parts alone: on a pass of one patch around which the ball's centre moves about as far as the contact.
+    differences: DifferencesOf,
+    /// Stations are kept wherever derivatives change, not at even parts alone: on a pass of one patch, unless its derivatives are differences of positions and the ball's centre moves
+    /// much farther than the contact there, or less.
     adapts: bool,
     /// Whether the curvature jumped at a patch boundary of the last pass, and so far.
     has_jump: bool,
@@ -189,8 +207,9 @@ impl Lookahead {
         begun: 0,
         halvings: 0,
         is_coarse: false,
+        by_pieces: false,
+        bends_until: None,
         keeps_even: false,
-        cell_mm: CELL_FINE_MM,
         least_mm: STRETCH_MIN_MM,
         pass_mm: 0.0,
         station: 0,
@@ -199,11 +218,13 @@ impl Lookahead {
         looks: 1,
         cells: 1,
         cell_fraction: 0,
+        first_looks: 1,
         patch_mm: 0.0,
         centre_mm: 0.0,
         has_bend: false,
         bends: false,
         may_turn: false,
+        differences: DifferencesOf::Positions,
         adapts: false,
         has_jump: false,
         jumps: false,
@@ -255,7 +276,11 @@ impl Lookahead {
             Task::Extend => cycles::EXTEND,
             Task::Station if self.is_on_front() && self.is_beyond_piece() => cycles::PIECE,
             Task::Station if self.is_on_front() => cycles::FRONT_STATION,
+            Task::Station if self.differences == DifferencesOf::Directions => cycles::DIRECTED_STATION,
             Task::Station | Task::Maximum(_) => cycles::STATION,
+            Task::Derivatives(..) if self.differences == DifferencesOf::Directions => {
+                cycles::DIRECTED_DERIVATIVES
+            }
             Task::Derivatives(..) => cycles::DERIVATIVES,
             Task::Estimate(1..) if estimator.is_some_and(makes_patch) => cycles::PATCH,
             Task::Estimate(0) => cycles::NEXT,
@@ -281,6 +306,7 @@ impl Lookahead {
         self.task = if has_head { Task::Head(0) } else { Task::Patch };
         (self.station, self.patches) = (0, 0);
         (self.halvings, self.is_coarse, self.keeps_even) = (0, false, false);
+        (self.by_pieces, self.bends_until) = (false, None);
         self.start_q10 = if has_head { head.half_q10() } else { 0 };
         out.head = if has_head { turn::STATIONS } else { 0 };
         out.head_q10 = self.start_q10;
@@ -416,7 +442,7 @@ impl Lookahead {
             self.measure_by(job, axes);
         }
         if self.is_on_front() {
-            self.adapts = false;
+            (self.adapts, self.differences) = (false, DifferencesOf::Directions);
             self.begin_stretch(out)?;
             return Ok(Task::Extend);
         }

@@ -1,15 +1,18 @@
 //! Stations of a piece: which of them are looked at and kept, their checks, arcs and derivatives.
 
 use super::stretch::HALVED_MIN_MM;
-use super::{CELL_KEPT_MM, Lookahead, PATCHES, PassPlan, Task, check_crease, check_travel, stations_of};
+use super::{
+    CELL_KEPT_MM, DifferencesOf, Lookahead, PATCHES, PassPlan, Task, check_crease, check_travel, stations_of,
+};
 use crate::fault::{Fault, FaultKind, Result};
 use crate::feed::stations::{
-    CELL_MIN_MM, CELLS_FINE, CELLS_MANY, Derivatives, FIRST_NOISE, Station, WINDOW, Window, parts_of_cell,
+    CELL_MIN_MM, CELLS_FINE, CELLS_MANY, Derivatives, Station, WINDOW, Window, parts_of_cell,
 };
 use crate::job::program::Job;
 use crate::job::{AxisLimits, SurfaceKind};
 use crate::math::arith::{fraction_to_f32, sqrt, truncated};
 use crate::math::number::{Bounded, MM_PER_NM, nm_to_mm, to_f32};
+use crate::math::vec3::Vec3;
 use crate::pass::step_over::StepOverEstimator;
 use crate::sequence::link::is_elsewhere;
 use crate::surface::{Contact, PathSpeed};
@@ -53,7 +56,12 @@ impl Lookahead {
         let turns =
             |[length, centre]: &[f32; 2]| CENTRE_SHARE * centre > *length || hardly_fits(*length, *centre);
         self.may_turn = halves.iter().any(turns);
-        self.adapts = spans == 1 && !self.may_turn;
+        self.adapts = spans == 1;
+        self.differences = if self.adapts {
+            DifferencesOf::Directions
+        } else {
+            DifferencesOf::Positions
+        };
         let length = length.at_least(by_centre);
         if out.cells == 0 {
             let [start, end] = out.route.ends;
@@ -110,6 +118,7 @@ impl Lookahead {
             let least = CELLS_FINE.min(whole(length / HALVED_MIN_MM).max(1));
             self.looks = self.looks.max(least.div_ceil(self.kept.max(1)));
         }
+        self.first_looks = self.looks;
         out.plan.stations.note_group(out.group);
         self.begun = out.plan.stations.count();
         self.divide_patch();
@@ -187,7 +196,7 @@ impl Lookahead {
             let q = self.window.derivatives(usize::from(at));
             let begins = station == 0 && self.patches.is_multiple_of(out.group);
             for back in [1, 2] {
-                stations.note_spacing(back, self.window.spacing_mm());
+                stations.note_spacing(back, self.window.noise_spacing_mm());
                 if let Some(place) = stations.back_mut(back) {
                     widen(&mut place.q, &q, begins || back == 1);
                 }
@@ -200,7 +209,7 @@ impl Lookahead {
     /// Stores the derivatives at the start of a patch, or of a stretch, in the station so far from the last one.
     pub(super) fn store_start(&mut self, back: u16, q: Derivatives, out: &mut PassPlan) {
         let stations = &mut out.plan.stations;
-        stations.note_spacing(back, self.window.spacing_mm());
+        stations.note_spacing(back, self.window.noise_spacing_mm());
         let Some(place) = stations.back_mut(back) else {
             return;
         };
@@ -241,7 +250,8 @@ impl Lookahead {
         } else {
             16.0 * (turn * turn * turn * turn + change * change)
         };
-        jump > BEND_MIN + FIRST_NOISE / cell + first * error
+        let [noise, ..] = self.window.noise();
+        jump > BEND_MIN + noise + first * error
     }
 
     /// Evaluations of the step-over estimator at a station.
@@ -268,7 +278,12 @@ impl Lookahead {
         out: &mut PassPlan,
     ) -> Result<()> {
         let fraction = self.fraction();
-        let (contact, located) = self.patch.evaluate(fraction)?;
+        let (contact, located, direction) = if self.differences == DifferencesOf::Directions {
+            self.patch.evaluate_with_direction(fraction)?
+        } else {
+            let (contact, located) = self.patch.evaluate(fraction)?;
+            (contact, located, None)
+        };
         check_travel(axes, &located.cl_nm)?;
         check_height(axes, &located.cl_nm)?;
         self.see(job, fraction, &contact);
@@ -312,7 +327,9 @@ impl Lookahead {
         }
         self.bend = bend;
         self.speed = path;
-        self.window.push(located.cl_nm, self.arc_mm);
+        let direction = direction.map(|Vec3 { x, y, z }| [x, y, z]);
+        self.window.push(located.cl_nm, self.arc_mm, direction);
+        self.note_within();
         self.keep(out);
         Ok(())
     }

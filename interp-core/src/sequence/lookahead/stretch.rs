@@ -1,11 +1,11 @@
 //! Stretches of a pass on a front: pieces of one path span, together long enough for differences.
 
 use super::stations::widen;
-use super::{Lookahead, PATCHES, PassPlan, STATIONS, STRETCH_MIN_MM, Task, has_turns};
+use super::{DifferencesOf, Lookahead, PATCHES, PassPlan, STATIONS, STRETCH_MIN_MM, Task, has_turns};
 use crate::fault::Result;
 use crate::feed::limits::{AxisMotion, MotionLimits};
-use crate::feed::stations::{CELL_FINE_MM, CELL_MIN_MM, CELLS_FINE, Derivatives, PARTS_MAX, Station, Window};
-use crate::feed::{Q10_BITS, to_q10, turn};
+use crate::feed::stations::{CELL_FINE_MM, CELLS_FINE, Derivatives, PARTS_MAX, Station, Window};
+use crate::feed::{MM_PER_Q10, Q10_BITS, to_q10, turn};
 use crate::job::AxisLimits;
 use crate::job::program::Job;
 use crate::math::arith::{fraction_to_f32, power_of_two, sqrt, truncated};
@@ -17,6 +17,10 @@ use crate::surface::PathSpeed;
 const STRETCH_KNOT_MM: f32 = 0.3;
 /// The least with derivatives of its own, mm.
 const STRETCH_SHORT_MM: f32 = 0.02;
+const PIECE_SHORT_MM: f32 = 0.002;
+/// Fewest cells of a stretch that is one piece: the derivative of its directions is straight. Least length of a cell of any stretch, mm.
+const CELLS_OF_PIECE: u16 = 2;
+const CELL_FRONT_MIN_MM: f32 = 0.03;
 
 /// Change of a second and of a third derivative of an axis from which on a station within a stretch is kept, as shares of what takes the axis to its limit. Error of a third
 /// derivative by rounded positions, times the third power of a cell's length, mm.
@@ -25,19 +29,18 @@ const NOTABLE_THIRD: f32 = 0.06;
 /// Stations kept of those looked at on a piece up to which these shares hold, and by how much more they are at most where there is room for fewer.
 const KEPT_SHARE: f32 = 1.0;
 const LESS_NOTABLE_MAX: f32 = 1.4;
-const THIRD_NOISE: f32 = 60e-6;
 /// Turn within a cell, and its change from one to the next, from which on a stretch is looked at again with shorter cells, rad; how often they are halved.
-const TURN_OF_CELL: f32 = 0.12;
-const CHANGE_OF_CELL: f32 = 0.008;
+const TURN_OF_CELL: f32 = 0.06;
+const CHANGE_OF_CELL: f32 = 0.004;
 const HALVINGS_MAX: u8 = 3;
-/// The same on a patch of a straight pass into which the ball hardly fits, or where it goes around an edge: all of it is looked at again; shorter cells are not halved, mm.
+/// The same on the patch of a straight pass of one, and on one into which the ball hardly fits, or where it goes around an edge: all of it is looked at again.
+const TURN_STRAIGHT: f32 = 0.12;
 const CHANGE_STRAIGHT: f32 = 0.04;
-const HALVINGS_STRAIGHT: u8 = 4;
+/// How often its cells are halved, and length of one that is not, mm: by differences of directions, and of positions.
+const HALVINGS_DIRECTIONS: u8 = 6;
+const HALVED_DIRECTIONS_MIN_MM: f32 = 0.002;
+const HALVINGS_POSITIONS: u8 = 4;
 pub(super) const HALVED_MIN_MM: f32 = 0.03;
-/// Share of the jerk limit that the error of a third derivative takes at the feed up to which a cell is not longer, and steps to longer ones.
-const NOISE_SHARE: f32 = 0.05;
-const CELL_STEP: f32 = 1.2;
-const CELL_STEPS: u8 = 4;
 /// Stations that are left for pieces beyond those expected.
 const SPARE: u16 = 6;
 
@@ -51,7 +54,7 @@ impl Lookahead {
         if length.is_finite() { length } else { 0.0 }
     }
 
-    /// Begins a stretch of a pass on a front.
+    /// Begins a stretch of a pass on a front. Its derivatives are differences of directions.
     pub(super) fn begin_stretch(&mut self, out: &mut PassPlan) -> Result<()> {
         let PathSpeed {
             inv_speed,
@@ -67,6 +70,10 @@ impl Lookahead {
             return Ok(());
         }
         self.begun = out.plan.stations.count();
+        let span = self.piece.position.span;
+        self.by_pieces = self
+            .bends_until
+            .is_some_and(|(bent, end)| bent == span && self.piece.start() < end);
         let [_, before] = self.stretch;
         // Between stations of a front, not at a knot of the surface.
         let is_at_knot = before.front.is_none_or(|front| front.is_at_knot());
@@ -112,17 +119,6 @@ impl Lookahead {
         );
         let inverse = 1.0 / feed;
         self.slowest = [inverse * inverse, inverse * inverse * inverse];
-        let jerk = limits
-            .axes
-            .iter()
-            .fold(f32::MAX, |least, axis| least.at_most(axis.jerk));
-        self.cell_mm = CELL_FINE_MM;
-        for _ in 0..CELL_STEPS {
-            let noise = THIRD_NOISE * (feed / self.cell_mm) * (feed / self.cell_mm) * (feed / self.cell_mm);
-            if noise > NOISE_SHARE * jerk {
-                self.cell_mm *= CELL_STEP;
-            }
-        }
     }
 
     /// Lengthens the stretch by a piece, or ends it.
@@ -145,15 +141,27 @@ impl Lookahead {
         let length = self.part_mm(end.saturating_sub(start));
         let whole = |value: f32| u16::try_from(truncated(value)).unwrap_or(u16::MAX);
         let share = power_of_two(-i32::from(self.halvings));
-        let fine = whole(length / self.cell_mm).max(CELLS_FINE) << self.halvings;
+        let fewest = if self.by_pieces {
+            CELLS_OF_PIECE
+        } else {
+            CELLS_FINE
+        };
+        let fine = whole(length / CELL_FINE_MM).max(fewest) << self.halvings;
         // Near a rest the tool is slow, and rounding does no harm.
-        let least = if self.patches == 0 || self.after.is_none() {
+        let least = if self.by_pieces {
+            fine
+        } else if self.patches == 0 || self.after.is_none() {
             CELLS_FINE
         } else {
             2
         };
-        let most = whole(length / (CELL_MIN_MM * share)).max(least);
-        self.is_short = length < STRETCH_SHORT_MM;
+        let most = whole(length / (CELL_FRONT_MIN_MM * share)).max(least);
+        self.is_short = length
+            < if self.by_pieces {
+                PIECE_SHORT_MM
+            } else {
+                STRETCH_SHORT_MM
+            };
         self.looks = if self.is_short {
             1
         } else {
@@ -179,7 +187,7 @@ impl Lookahead {
         let has_room = self.least_mm < f32::MAX
             && self.patches + spans < PATCHES
             && out.plan.stations.count() + 2 * spans < STATIONS;
-        if last.front.is_some_and(|front| front.is_at_knot()) {
+        if self.by_pieces || last.front.is_some_and(|front| front.is_at_knot()) {
             return has_room;
         }
         let span_end = if span == pass_end.span {
@@ -200,50 +208,103 @@ impl Lookahead {
     /// Begins the stretch, or the patch of a straight pass, again with cells half as long where the path turns too far within one. Returns the task by which it does.
     pub(super) fn looks_finer(&mut self, out: &mut PassPlan) -> Option<Task> {
         let is_coarse = core::mem::take(&mut self.is_coarse);
-        let (most, is_fine) = if self.is_on_front() {
-            (HALVINGS_MAX, false)
-        } else {
-            let cell = self.arc_mm / f32::from(self.cells);
-            (HALVINGS_STRAIGHT, cell < HALVED_MIN_MM)
+        let is_on_front = self.is_on_front();
+        let is_by_directions = !is_on_front && self.differences == DifferencesOf::Directions;
+        let (most, least_mm) = match self.differences {
+            _ if is_on_front => (HALVINGS_MAX, 0.0),
+            DifferencesOf::Directions => (HALVINGS_DIRECTIONS, HALVED_DIRECTIONS_MIN_MM),
+            DifferencesOf::Positions => (HALVINGS_POSITIONS, HALVED_MIN_MM),
+            DifferencesOf::PositionsAfterAll => (1 + HALVINGS_POSITIONS, HALVED_MIN_MM),
         };
-        let is_last = is_fine || self.halvings >= most;
-        if !is_coarse || (is_last && (!self.adapts || self.keeps_even)) {
+        let is_last = self.halvings >= most || self.arc_mm < least_mm * f32::from(self.cells);
+        let is_known_coarsely = is_last && !is_by_directions && (!self.adapts || self.keeps_even);
+        if !is_coarse || is_known_coarsely {
             (self.halvings, self.keeps_even) = (0, false);
             return None;
         }
         if is_last {
-            // Known too coarsely for stations of its own.
-            self.keeps_even = true;
+            if is_by_directions {
+                self.differences = DifferencesOf::PositionsAfterAll;
+                self.adapts = !self.may_turn;
+                (self.halvings, self.looks) = (1, self.first_looks);
+            } else {
+                // Too coarsely for stations of its own.
+                self.keeps_even = true;
+            }
             out.plan.stations.truncate(self.begun);
             self.divide_patch();
             return Some(Task::Station);
         }
         self.halvings += 1;
         out.plan.stations.truncate(self.begun);
-        if !self.is_on_front() {
+        if !is_on_front {
             self.looks = (2 * self.looks).min(PARTS_MAX);
             self.divide_patch();
             return Some(Task::Station);
         }
+        // The first stretch may now be too short.
+        self.has_derivatives &= self.begun > 0;
         let [first, _] = self.stretch;
         self.piece = first;
+        if !self.by_pieces && self.has_room_for_pieces(out) {
+            let [_, end] = self.range;
+            self.bends_until = Some((first.position.span, end));
+            self.by_pieces = true;
+        }
         Some(Task::Patch)
+    }
+
+    /// Whether there is room for a stretch of each piece of the one that is looked at, besides those of the rest of the pass.
+    fn has_room_for_pieces(&self, out: &PassPlan) -> bool {
+        let [first, last] = self.stretch;
+        let (Some(from), Some(to)) = (first.front, last.front) else {
+            return false;
+        };
+        let done_mm = to_f32(self.start_q10) * MM_PER_Q10;
+        let rest = truncated((self.pass_mm - done_mm) / self.least_mm);
+        let rest = u16::try_from(rest).unwrap_or(PATCHES);
+        let [_, pass_end] = out.route.ends;
+        let spans = first.position.span.abs_diff(pass_end.span) + 2;
+        let wanted = (to.number - from.number)
+            .saturating_add(rest)
+            .saturating_add(spans);
+        self.least_mm < f32::MAX && self.patches.saturating_add(wanted) < PATCHES
+    }
+
+    /// Whether the stretch or the patch is looked at again where its cells are too long.
+    const fn looks_again(&self) -> bool {
+        self.adapts || self.may_turn || self.is_on_front()
+    }
+
+    /// Notes whether the path bends and bends back within the last cell.
+    pub(super) fn note_within(&mut self) {
+        if self.station == 0 || !self.looks_again() {
+            return;
+        }
+        let cell = self.window.spacing_mm();
+        let most = if self.is_on_front() {
+            CHANGE_OF_CELL * cell
+        } else {
+            CHANGE_STRAIGHT * cell * self.window.greatest()
+        };
+        self.is_coarse |= self.window.third_within() > most;
     }
 
     /// Notes whether the path turns too far within a cell that these derivatives were taken over.
     pub(super) fn note_turn(&mut self, q: &Derivatives) {
         let cell = self.window.spacing_mm();
-        let (mut way, mut change) = (cell, CHANGE_OF_CELL);
+        let (mut way, mut turn, mut change) = (cell, TURN_OF_CELL, CHANGE_OF_CELL);
         if !self.is_on_front() {
-            change = CHANGE_STRAIGHT;
+            (turn, change) = (TURN_STRAIGHT, CHANGE_STRAIGHT);
             // Where such a patch rolls off, the centre moves much farther than the contact.
             for [first, ..] in q {
                 way = way.at_least(first.abs() * cell);
             }
         }
+        let [_, _, noise] = self.window.noise();
         for [_, second, third] in q {
-            self.is_coarse |= second.abs() * cell * cell > TURN_OF_CELL * way
-                || third.abs() * cell * cell * cell > change * way;
+            self.is_coarse |= second.abs() * cell * cell > turn * way
+                || (third.abs() - noise) * cell * cell * cell > change * way;
         }
     }
 
@@ -251,7 +312,7 @@ impl Lookahead {
     /// notably since the last one. Between stations they are taken for linear.
     pub(super) fn keep_derivatives(&mut self, station: u16, at: usize, out: &mut PassPlan) {
         let q = self.window.derivatives(at);
-        if self.adapts || self.may_turn || self.is_on_front() {
+        if self.looks_again() {
             self.note_turn(&q);
         }
         let here = Station {
@@ -330,7 +391,7 @@ impl Lookahead {
             widen(&mut station.q, &missed, false);
         }
         out.plan.stations.push(station);
-        out.plan.stations.note_spacing(1, self.window.spacing_mm());
+        out.plan.stations.note_spacing(1, self.window.noise_spacing_mm());
     }
 
     /// Stations that may be kept besides those at the stretches' ends: one of each piece that is left, two where a knot is crossed.
@@ -362,8 +423,7 @@ impl Lookahead {
 
     /// Whether the higher derivatives differ by more than a share of what takes an axis to its limit, at the feed or the lower speed that they allow.
     fn is_notable(&self, from: &Derivatives, to: &Derivatives, tolerance: f32) -> bool {
-        let cell = self.window.spacing_mm();
-        let noise = THIRD_NOISE / (cell * cell * cell);
+        let [_, _, noise] = self.window.noise();
         // Inverse powers of the speed.
         let [mut square, mut cube] = self.slowest;
         for q in [from, to] {

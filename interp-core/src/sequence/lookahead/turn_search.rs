@@ -69,7 +69,7 @@ impl Lookahead {
             self.arc_mm += self.cell_length(job, &contact.path);
         }
         self.speed = contact.path;
-        self.window.push(located.cl_nm, self.arc_mm);
+        self.window.push(located.cl_nm, self.arc_mm, None);
         if self.window.count() < WINDOW && !self.is_end() {
             self.station += 1;
             return Task::Start;
