@@ -2,6 +2,7 @@
 
 mod links;
 mod path;
+mod windows;
 
 use std::vec::Vec;
 

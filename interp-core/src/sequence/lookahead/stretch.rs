@@ -22,8 +22,7 @@ const PIECE_SHORT_MM: f32 = 0.002;
 const CELLS_OF_PIECE: u16 = 2;
 const CELL_FRONT_MIN_MM: f32 = 0.03;
 
-/// Change of a second and of a third derivative of an axis from which on a station within a stretch is kept, as shares of what takes the axis to its limit. Error of a third
-/// derivative by rounded positions, times the third power of a cell's length, mm.
+/// Change of a second and of a third derivative of an axis from which on a station within a stretch is kept, as shares of what takes the axis to its limit.
 const NOTABLE_SECOND: f32 = 0.03;
 const NOTABLE_THIRD: f32 = 0.06;
 /// Stations kept of those looked at on a piece up to which these shares hold, and by how much more they are at most where there is room for fewer.
@@ -103,7 +102,7 @@ impl Lookahead {
         Ok(())
     }
 
-    /// Sets what notable changes and the noise of derivatives are measured by, for a pass.
+    /// Sets what notable changes of derivatives are measured by, for a pass.
     pub(super) fn measure_by(&mut self, job: &Job<'_>, axes: &AxisLimits) {
         self.most = if has_turns(job) {
             STATIONS - turn::STATIONS
